@@ -73,7 +73,7 @@ test("after a restore each person decides about the edits that waited, and sees 
   await card(ada.page, "Grip").click({ position: { x: 50, y: 30 } });
   await ada.page.keyboard.press("Delete");
   await add(ada.page, "Mine");
-  await expect(ada.page.getByText(/Offline with \d+ change/)).toBeVisible();
+  await expect(ada.page.getByText(/Server away with \d+ change/)).toBeVisible();
   await product.command("restore", file);
   await product.start();
 
@@ -114,7 +114,7 @@ test("who decides later is asked again, can save the changes as a file, and disc
   const before = await stored();
   await product.kill();
   await add(ada.page, "Wavering");
-  await expect(ada.page.getByText(/Offline with \d+ change/)).toBeVisible();
+  await expect(ada.page.getByText(/Server away with \d+ change/)).toBeVisible();
   await product.command("restore", join(product.data, "backup.zip"));
   await product.start();
   const dialog = ada.page.getByRole("dialog", { name: /restored backup/ });

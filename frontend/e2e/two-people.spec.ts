@@ -55,9 +55,9 @@ test("two people build, run and review a graph; kill -9 loses nothing", async ()
 
   // Everything dies, and comes back.
   await product.kill();
-  await expect(page.getByText(/offline/i).first()).toBeVisible();
+  await expect(page.getByText(/server away/i).first()).toBeVisible();
   await add(page, "Report");
-  await expect(page.getByText(/Offline with \d+ change/)).toBeVisible();
+  await expect(page.getByText(/Server away with \d+ change/)).toBeVisible();
   await product.start();
   await saved(page);
   await expect(card(mari.page, "Report")).toBeVisible();

@@ -182,12 +182,18 @@ class Watchdog:
 
     Silence counts from an answer on, so a start that changes tables for hours is none. It is counted
     in questions without an answer, each with the time that it may take at most, so the sleep of the
-    computer is none either.
+    computer is none either. `data`: the folder in which it is kept that a process was ended.
     """
 
     def __init__(
-        self, child: Child, origin: str, trust: ssl.SSLContext | None, limit: float
+        self,
+        child: Child,
+        origin: str,
+        trust: ssl.SSLContext | None,
+        limit: float,
+        data: Path | None = None,
     ) -> None:
+        self._data = data
         self._child = child
         self._url = f"{origin}:{child.port}"
         self._trust = trust
@@ -226,11 +232,25 @@ class Watchdog:
         self._silent += seconds
         if self._ends and self._silent >= self._limit:
             say(f"{self._child.name} has not answered for {self._silent:.0f} s; ending it", "error")
+            silent = self._silent
             self._heard(0)
             self._child.kill()
+            self._note_hang(silent)
         elif self._silent >= self._first_line + self._lines * _SAID_EACH:
             self._lines += 1
             say(self._sentence(), "error")
+
+    def _note_hang(self, silent: float) -> None:
+        """Keep it for the administration page."""
+        if self._data is None:
+            return
+        # Most never need it, and it takes as long to load as much of the rest.
+        from action_assistant.web.monitoring.faults import Hang, note_hang
+
+        try:
+            note_hang(self._data, self._child.name, Hang(time.time(), silent))
+        except OSError as error:
+            say(f"this could not be kept in the data folder: {error.strerror}")
 
     def _heard(self, starts: int) -> None:
         self._starts, self._silent, self._lines = starts, 0.0, 0
@@ -263,7 +283,7 @@ def serve(plan: ServePlan) -> int:
     for child in children:
         child.start(reading)
         if plan.watchdog is not None:
-            watchdog = Watchdog(child, _origin(plan), trust, plan.watchdog)
+            watchdog = Watchdog(child, _origin(plan), trust, plan.watchdog, plan.data)
             threading.Thread(target=watchdog.run, name=f"watch {child.name}", daemon=True).start()
             watchdogs.append(watchdog)
     greeting = (plan, keys, trust, children, watchdogs, enough)

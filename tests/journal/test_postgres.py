@@ -111,11 +111,12 @@ async def test_while_the_server_is_down_appends_and_reads_fail_at_once(mortal: S
     await journal.append("a", [draft()])
     await asyncio.to_thread(mortal.stop, "fast")
     async with asyncio.timeout(2):
-        with pytest.raises(Unavailable, match="Nothing can be stored"):
+        away = "the database server does not answer"
+        with pytest.raises(Unavailable, match=f"Nothing can be stored at the moment: {away}"):
             await journal.append("a", [draft()])
-        with pytest.raises(Unavailable, match="cannot be read"):
+        with pytest.raises(Unavailable, match=f"cannot be read: {away}"):
             await journal.read("a")
-        assert await journal.health() is not None
+        assert away in (await journal.health() or "")
     await asyncio.to_thread(mortal.start)
     assert await journal.append("a", [draft()]) == 2
     assert [e.seq for e in await journal.read("a")] == [1, 2]
@@ -234,7 +235,7 @@ async def test_a_server_that_forgets_commits_is_refused(
 @pytest.mark.parametrize(
     ("url", "says"),
     [
-        ("postgresql://aa@127.0.0.1:1/aa", "refused"),
+        ("postgresql://aa@127.0.0.1:1/aa", "nothing listens there"),
         ("postgresql://aa:secret@127.0.0.1:PORT/missing", '"missing" does not exist'),
         ("postgresql://127.0.0.1", "not supported"),
     ],

@@ -3,6 +3,7 @@
 import asyncio
 import os
 import random
+import shutil
 import sqlite3
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
@@ -11,7 +12,7 @@ from pathlib import Path
 import apsw
 import pytest
 
-from action_assistant.errors import Unavailable
+from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import Inspector
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
@@ -153,3 +154,16 @@ async def test_a_full_disk_refuses_edits_until_there_is_room_again(
     assert await journal.append("a", [draft(20_000)]) == acknowledged + 1
     assert await journal.verify() == []
     await journal.close()
+
+
+async def test_a_disk_that_is_full_at_the_start_is_called_full(
+    small_disk: Callable[[str], Path],
+) -> None:
+    disk = small_disk("1m")
+    url = f"sqlite:///{disk / 'editor.db'}"
+    journal = await Journal.open(url, branch="editor", fold=nothing)
+    await journal.append("a", [draft()])
+    await journal.close()
+    (disk / "ballast").write_bytes(bytes(shutil.disk_usage(disk).free))
+    with pytest.raises(CannotStart, match="the disk is full"):
+        await Journal.open(url, branch="editor", fold=nothing)

@@ -2,6 +2,7 @@
 import { IconServerCog } from "@tabler/icons-react";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
+import { serverNow } from "../clock/server-clock";
 import { Empty } from "../ui/empty";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
@@ -16,6 +17,7 @@ function Inside() {
   const ofRunner = useStatus("runner", runner);
   return (
     <>
+      <FaultsCard processes={[ofEditor.data, ofRunner.data]} />
       <div className={style.processes}>
         <ProcessCard title="Editor" asked={ofEditor} />
         <ProcessCard title="Runner" asked={ofRunner} />
@@ -85,6 +87,28 @@ export function BackupsCard({ backups, at }: { backups: Backups | null; at: stri
       ) : (
         <Facts facts={factsOf(backups, Date.parse(at))} />
       )}
+    </section>
+  );
+}
+
+/** Lists what a person has to mend, as either process has found it. Each names the other's faults, too. */
+function FaultsCard({ processes }: { processes: readonly (ProcessStatus | undefined)[] }) {
+  const faults = new Map(
+    processes.flatMap((each) => each?.faults ?? []).map((fault) => [fault.what, fault]),
+  );
+  if (faults.size === 0) return null;
+  return (
+    <section className="page-card min-w-0" aria-label="To be mended">
+      <div className={style.cardHead}>
+        <h3>To be mended</h3>
+      </div>
+      <ul className={style.lacking}>
+        {[...faults.values()].map(({ what, text, since }) => (
+          <li key={what}>
+            {text} <span className="ink2">Seen {ago(instant(since) ?? 0, serverNow())}.</span>
+          </li>
+        ))}
+      </ul>
     </section>
   );
 }

@@ -34,6 +34,23 @@ export function isOutcomeUnknown(error: unknown): boolean {
 /** The `type` of an answer that none of ours gave, as a proxy's. */
 const UNKNOWN_TYPE = "refused";
 
+/** Return whether a proxy answered in place of the server, since it cannot reach it. */
+export function isProxyFault(error: Refusal): boolean {
+  const { status, type } = error.details;
+  return type === UNKNOWN_TYPE && status >= 502 && status <= 504;
+}
+
+const STORAGE = ["database", "writer", "schema", "disk"] as const;
+
+/** Return why the editor can store nothing at the moment, in its words; null if it can, or does not say. */
+export async function storageFault(): Promise<string | null> {
+  const answer = await send("/readyz", {}).catch(() => null);
+  const body: unknown = await answer?.json().catch(() => null);
+  const parts = (body as { parts?: Readonly<Record<string, string | null>> } | null)?.parts;
+  const faults = STORAGE.map((part) => parts?.[part]).filter((fault) => fault != null);
+  return faults.length === 0 ? null : faults.join(" ");
+}
+
 /** Return whether one of our servers refused a request: sending it again will not help. */
 export function isFinal(error: unknown): boolean {
   if (!(error instanceof Refusal)) return false;

@@ -213,10 +213,15 @@ function Inside({ id }: { id: string }) {
         }
         seed={seed}
         held={live && asksPeople(live, now.engines) && <RunQuestions run={live} />}
-        corner={<ConnectionStatus run={live} whose={going.length > 1} />}
+        corner={<Corner run={live} whose={going.length > 1} />}
       />
     </>
   );
+}
+
+function Corner(props: Pick<ComponentProps<typeof ConnectionStatus>, "run" | "whose">) {
+  const alone = useLinkPart((link) => link.state !== "live");
+  return <ConnectionStatus {...props} alone={alone} />;
 }
 
 type Settled = Pick<ComponentProps<typeof StartControl>, "settle">;

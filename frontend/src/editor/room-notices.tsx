@@ -1,8 +1,17 @@
 /** Notices over the canvas about this person's edits and the connection, each with what the person can do. */
 import { Button, CloseButton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
+import {
+  IconArchive,
+  IconDatabaseOff,
+  IconHistory,
+  IconInfoCircle,
+  IconLock,
+  IconUsers,
+} from "@tabler/icons-react";
 import { useCallback, useEffect, useState } from "react";
+import { Link } from "wouter";
+import { useMay } from "../api/people";
 import { MOST_VALUE_BYTES, onTooLarge } from "../graph/edit/edit-size";
 import type { ConnectionNotice } from "../sync/graph-connection";
 import { otherPeopleWait } from "../sync/unsaved-reasons";
@@ -50,6 +59,27 @@ function ReadOnly() {
         </>
       ) : (
         "An owner can change that."
+      )}
+    </Notice>
+  );
+}
+
+/** Tells that the server answers, and cannot store: to owners also why, and where to look. */
+function NotStored() {
+  const why = useLinkPart((link) => (link.state === "live" ? undefined : link.why));
+  const said = useLinkPart((link) => link.said);
+  const waits = useLinkPart((link) => link.unsaved > 0);
+  const owns = useMay("restore");
+  if (why !== "not-stored") return null;
+  return (
+    <Notice icon={<IconDatabaseOff size={16} />} tone="warn">
+      The server cannot store anything at the moment.{" "}
+      {waits ? "Your changes wait here, and are sent when it can." : "What you change waits here."}
+      {owns && (
+        <>
+          {" "}
+          {said} See <Link to="/admin">Administration</Link>.
+        </>
       )}
     </Notice>
   );
@@ -147,6 +177,7 @@ export function RoomNotices() {
     <>
       <div className={style.notices} role="status">
         <ReadOnly />
+        <NotStored />
         {said && (
           <Notice
             icon={

@@ -7,8 +7,12 @@ test("Saved is shown only when nothing waits and the room is live", () => {
   expect(saveStatusText({ state: "live", unsaved: 0, seq: 4 }).words).toBe("Saved");
   expect(saveStatusText({ state: "live", unsaved: 3, seq: 4 }).words).toBe("Saving 3");
   expect(saveStatusText({ state: "live", unsaved: 0, seq: 4 }, false).words).toBe("View only");
-  expect(saveStatusText({ state: "offline", unsaved: 2, seq: 4 }).words).toBe(
-    "Offline with 2 changes",
+  const away = { state: "offline", unsaved: 2, seq: 4 } as const;
+  expect(saveStatusText(away).words).toBe("Server away with 2 changes");
+  expect(saveStatusText({ ...away, why: "no-network" }).words).toBe("Offline with 2 changes");
+  expect(saveStatusText({ ...away, why: "proxy" }).words).toBe("Proxy error with 2 changes");
+  expect(saveStatusText({ ...away, why: "not-stored" }).words).toBe(
+    "Server cannot store with 2 changes",
   );
   expect(saveStatusText({ state: "connecting", unsaved: 0, seq: 0 }).words).toBe("Opening");
   expect(saveStatusText({ state: "live", unsaved: 0, seq: 0 }, false).words).toBe("Opening");
@@ -34,7 +38,7 @@ test("text that is not yet in the graph counts as unsaved", () => {
   expect(words({ writing: 0, waiting: 1 })).toBe("1 draft not saved");
   expect(words({ writing: 0, waiting: 2 })).toBe("2 drafts not saved");
   expect(words({ writing: 1, waiting: 0 }, { ...link, state: "offline" })).toBe(
-    "Offline with 1 change",
+    "Server away with 1 change",
   );
 });
 

@@ -32,6 +32,9 @@ const whys: Record<RefusalReason, string> = {
   "not-accepted": "The server refused a change",
   restarting: "The editor restarts",
   "too-slow": "Connection too slow",
+  "no-network": "Offline",
+  proxy: "Proxy error",
+  "not-stored": "Server cannot store",
   "no-socket": "No connection",
 };
 
@@ -69,8 +72,9 @@ export function saveStatusText(
       ? { tone: "busy", words: "Opening" }
       : { tone: "off", words: whys[link.why] };
   }
-  if (link.unsaved === 0) return { tone: "off", words: "Offline" };
-  return { tone: "off", words: `Offline with ${counted(link.unsaved, "change")}` };
+  const state = link.why === undefined ? "Server away" : whys[link.why];
+  if (link.unsaved === 0) return { tone: "off", words: state };
+  return { tone: "off", words: `${state} with ${counted(link.unsaved, "change")}` };
 }
 
 const signs = {

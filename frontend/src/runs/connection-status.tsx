@@ -42,14 +42,23 @@ function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
   );
 }
 
-export function ConnectionStatus({ run, whose = false }: { run?: Run | null; whose?: boolean }) {
+/** `alone`: the editor does not answer, so "Live" would be said of half of the page. */
+export function ConnectionStatus({
+  run,
+  whose = false,
+  alone = false,
+}: {
+  run?: Run | null;
+  whose?: boolean;
+  alone?: boolean;
+}) {
   const { now } = useLive();
   if (now.link === "live") {
     return (
       <span className="inline-flex gap-40">
         {run && run.ended_at === null && !run.simulated && <LastSeen run={run} whose={whose} />}
         <span className={style.word} data-link="live">
-          <i aria-hidden /> Live
+          <i aria-hidden /> {alone ? "Robots live" : "Live"}
         </span>
       </span>
     );

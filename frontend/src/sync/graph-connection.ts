@@ -9,7 +9,7 @@
  */
 
 import { editor } from "../api/client";
-import { Refusal } from "../api/http";
+import { isProxyFault, Refusal, storageFault } from "../api/http";
 import { currentPerson } from "../api/session";
 import {
   browserStore,
@@ -29,7 +29,7 @@ import {
   strandedEditsIn,
   strandedEditsOf,
 } from "./replaced-history";
-import type { Room, RoomLink } from "./room";
+import { type AdmissionCheck, Away, type Room, type RoomLink } from "./room";
 import type { PersistenceOptions, RefusalReason, RoomOptions } from "./room-connection";
 
 /** An event of the connection that the page shows as a notice, without asking for anything. */
@@ -391,24 +391,24 @@ function untilRefused(room: Room): AbortSignal {
 }
 
 /**
- * Returns the `admit` of a room: it asks the server who this browser is. Rejects with `Unreachable` when nobody
- * answers.
+ * Returns the `admit` of a room: it asks the server who this browser is, and, if edits wait, whether it can store.
+ * Rejects with `Unreachable` when nobody answers, with `Away` when the proxy or the database is at fault.
  */
-function admissionCheck(
-  graph: string,
-  person: string,
-): (again: boolean) => Promise<RefusalReason | null> {
-  return async (again) => {
+function admissionCheck(graph: string, person: string): AdmissionCheck {
+  return async (again, hasWork) => {
     try {
       const here = await currentPerson();
       if (here.id !== person) return "other-person";
       if (again) await editor.get("/api/graphs/{graph_id}", { path: { graph_id: graph } });
+      const lack = again && hasWork ? await storageFault() : null;
+      if (lack !== null) throw new Away("not-stored", lack);
       return null;
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
       const why = REASONS.get(error.details.status);
-      if (why === undefined) throw error;
-      return why;
+      if (why !== undefined) return why;
+      if (isProxyFault(error)) throw new Away("proxy", error.message);
+      throw error.details.status === 503 ? new Away("not-stored", error.message) : error;
     }
   };
 }

@@ -46,6 +46,7 @@ export function refusalOf(code: number, reason: string): RefusalReason | undefin
 export const RETRIED_CLOSES: ReadonlyMap<number, RefusalReason> = new Map([
   [1012, "restarting"],
   [1013, "too-slow"],
+  [4503, "not-stored"],
 ]);
 
 /** An update that brings nothing. */

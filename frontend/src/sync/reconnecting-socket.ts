@@ -7,7 +7,7 @@
 
 import { tick } from "../clock/server-clock";
 import * as messages from "./messages";
-import type { AdmissionCheck, RefusalReason, Socket } from "./room";
+import { type AdmissionCheck, Away, type RefusalReason, type Socket } from "./room";
 
 /** The server says something at least every 15 s; a socket this silent is dead. */
 const SILENCE_MS = 30_000;
@@ -42,8 +42,8 @@ export interface SocketHandler {
   onMessage(data: Uint8Array): void;
   /** The socket is gone, whatever comes next. */
   onDrop(): void;
-  /** The socket was closed, and will be opened again without help. */
-  onAway(why: RefusalReason | undefined): void;
+  /** The socket was closed, and will be opened again without help. `said`: more words about it. */
+  onAway(why: RefusalReason | undefined, said?: string): void;
   /** The server refused the page, and no attempt follows. */
   onRefused(why: RefusalReason): void;
 }
@@ -119,12 +119,17 @@ export class ReconnectingSocket {
   }
 
   private async knock(admit: AdmissionCheck, turn: number): Promise<void> {
-    const why = await admit(this.attempts > 0).catch(() => "nobody" as const);
+    const why = await admit(this.attempts > 0, this.speaker.hasWork()).catch((error: unknown) =>
+      error instanceof Away ? error : ("nobody" as const),
+    );
     if (turn !== this.turn || this.phase === "closed") return;
     if (why === null) this.enter();
     else if (why === "nobody") {
       this.unopened = 0;
       this.stayAway(undefined);
+    } else if (why instanceof Away) {
+      this.unopened = 0;
+      this.stayAway(why.why, why.message);
     } else this.stop(why);
   }
 
@@ -180,9 +185,10 @@ export class ReconnectingSocket {
     this.speaker.onRefused(why);
   }
 
-  private stayAway(why: RefusalReason | undefined): void {
+  private stayAway(why: RefusalReason | undefined, said?: string): void {
     this.phase = "away";
-    this.speaker.onAway(why);
+    const hasNetwork = globalThis.navigator?.onLine !== false;
+    this.speaker.onAway(why ?? (hasNetwork ? undefined : "no-network"), said);
     const hidden = globalThis.document?.visibilityState === "hidden";
     const soon = Math.min(LAST_RETRY_MS, FIRST_RETRY_MS * 2 ** this.attempts);
     const longest = hidden && !this.speaker.hasWork() ? HIDDEN_RETRY_MS : soon;

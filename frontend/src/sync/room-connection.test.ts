@@ -5,6 +5,7 @@ import type * as Y from "yjs";
 import { asOneEdit, undoOf } from "../graph/edit";
 import { eraseKeys, writeKey } from "../graph/edit/document-writes";
 import { FakeServer, statesSent } from "../testing/fake-server";
+import { Away } from "./room";
 import { connectRoom, type RefusalReason, type Room, roomUrl } from "./room-connection";
 
 let server: FakeServer;
@@ -215,6 +216,7 @@ test.each([
 test.each([
   [1012, "restarting"],
   [1013, "too-slow"],
+  [4503, "not-stored"],
 ])("after %i the room comes back by itself", (code, why) => {
   server.accept();
   server.last.end(code);
@@ -391,6 +393,34 @@ test("leaving says goodbye, closes the socket and comes back no more", () => {
 test("the address of a room follows the page's own", () => {
   expect(roomUrl("a/b", "https://host:1/graphs/x?y#z")).toBe("wss://host:1/api/graphs/a%2Fb/room");
   expect(roomUrl("g", "http://host/")).toBe("ws://host/api/graphs/g/room");
+});
+
+test("a server that is away for a known reason says it, is asked again, and the words go when it is back", async () => {
+  let away: Away | null = new Away("not-stored", "The disk is full.");
+  const asked: boolean[] = [];
+  const admit = async (_again: boolean, hasWork: boolean) => {
+    asked.push(hasWork);
+    if (away !== null) throw away;
+    return null;
+  };
+  const other = connectRoom({ url: "ws://h/room", open: server.open, random: () => 1, admit });
+  await vi.advanceTimersByTimeAsync(0);
+  expect(other.link()).toMatchObject({
+    state: "offline",
+    why: "not-stored",
+    said: "The disk is full.",
+  });
+  other.doc.getMap("m").set("k", 1);
+  away = new Away("proxy", "The proxy answers 502.");
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(other.link()).toMatchObject({ why: "proxy", said: "The proxy answers 502." });
+  expect([asked[0], asked.at(-1)]).toEqual([false, true]);
+  away = null;
+  const before = server.sockets.length;
+  while (server.sockets.length === before) await vi.advanceTimersByTimeAsync(500);
+  server.accept();
+  expect(other.link()).toEqual({ state: "live", unsaved: 1, seq: 0 });
+  other.close();
 });
 
 test("a server that lets in but opens no socket is told from one that does not answer", async () => {

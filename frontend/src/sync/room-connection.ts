@@ -44,8 +44,9 @@ export * from "./room";
 /** Above this size, in bytes, waiting edits are sent one by one. */
 const LARGE = 1 << 18;
 
-type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
+type LinkChange = Partial<Omit<RoomLink, "why" | "said" | "readOnly">> & {
   why?: RefusalReason | undefined;
+  said?: string | undefined;
   readOnly?: string | undefined;
 };
 
@@ -180,13 +181,20 @@ class Connection implements Room, SocketHandler {
   }
 
   private say(change: LinkChange): void {
-    const { why, readOnly, ...rest } = { ...this.current, ...change };
+    const { why, said, readOnly, ...rest } = { ...this.current, ...change };
     const kept = this.persistence && { kept: this.persistence.kept };
-    const next: RoomLink = { ...rest, ...kept, ...(why && { why }), ...(readOnly && { readOnly }) };
+    const next: RoomLink = {
+      ...rest,
+      ...kept,
+      ...(why && { why }),
+      ...(said && { said }),
+      ...(readOnly && { readOnly }),
+    };
     const old = this.current;
     if (
       old.state === next.state &&
       old.why === next.why &&
+      old.said === next.said &&
       old.unsaved === next.unsaved &&
       old.kept === next.kept &&
       old.readOnly === next.readOnly &&
@@ -276,12 +284,12 @@ class Connection implements Room, SocketHandler {
     if (state !== null) this.awareness.setLocalState(state);
   }
 
-  onAway(why: RefusalReason | undefined): void {
-    this.say({ state: "offline", why });
+  onAway(why: RefusalReason | undefined, said?: string): void {
+    this.say({ state: "offline", why, said });
   }
 
   onRefused(why: RefusalReason): void {
-    this.say({ state: "refused", why });
+    this.say({ state: "refused", why, said: undefined });
   }
 
   /** Removes the others from the awareness until the socket is back. */
@@ -350,7 +358,7 @@ class Connection implements Room, SocketHandler {
         this.learned = true;
         this.socket.arrived();
         this.isAhead = false;
-        this.say({ state: "live", why: undefined });
+        this.say({ state: "live", why: undefined, said: undefined });
         this.isDoubted = false;
         if (this.asked !== null) this.give(this.asked);
         else if (this.outbox.answered) this.giveUnsent();

@@ -20,12 +20,17 @@ export type RefusalReason =
   | "not-accepted"
   | "restarting"
   | "too-slow"
+  | "no-network"
+  | "proxy"
+  | "not-stored"
   | "no-socket";
 
 export interface RoomLink {
   /** `refused` does not come back by itself: see `why` and `reconnect`. */
   readonly state: "connecting" | "live" | "offline" | "refused";
   readonly why?: RefusalReason;
+  /** The words of the server, or about its proxy, that say more than `why` does. */
+  readonly said?: string;
   /** The number of edits of this person that are not durable yet. */
   readonly unsaved: number;
   /** True if those edits survive closing this page. Absent for a room that keeps nothing. */
@@ -91,12 +96,22 @@ export interface RoomOptions {
   /**
    * Called before each attempt; returns a reason not to enter, or null. A browser cannot tell a refused upgrade
    * from a dead server, nor whose cookie an upgrade carries. `again` is true after an attempt or a connection
-   * broke off. Rejects when nobody answers.
+   * broke off; `hasWork` if edits wait. Rejects when nobody can be asked now, with `Away` when it is known why.
    */
   readonly admit?: AdmissionCheck;
 }
 
-export type AdmissionCheck = (again: boolean) => Promise<RefusalReason | null>;
+export type AdmissionCheck = (again: boolean, hasWork: boolean) => Promise<RefusalReason | null>;
+
+/** The server cannot be used at the moment, for a known reason: another attempt follows. */
+export class Away extends Error {
+  readonly why: RefusalReason;
+  constructor(why: RefusalReason, said: string) {
+    super(said);
+    this.name = "Away";
+    this.why = why;
+  }
+}
 
 export interface PersistenceOptions extends CopyOwner {
   /** The browser's storage by default. */

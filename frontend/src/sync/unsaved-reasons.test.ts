@@ -16,6 +16,20 @@ test("a person who works offline reads how many edits wait, and where", () => {
   expect(unsavedReason({ ...link, unsaved: 0 })).toBe("The server does not answer.");
 });
 
+test("what is away is named: the network, the server, its proxy, what it stores in", () => {
+  const link = { state: "offline", unsaved: 2, kept: true, seq: 3 } as const;
+  const waits = "2 changes wait on this device and survive closing the page.";
+  expect(unsavedReason({ ...link, why: "no-network" })).toBe(
+    `This device has no network. ${waits} Sent when there is one.`,
+  );
+  expect(unsavedReason({ ...link, why: "proxy", said: "The proxy answers 502." })).toBe(
+    `The proxy answers 502. ${waits} Sent when the server answers again.`,
+  );
+  expect(unsavedReason({ ...link, why: "not-stored", said: "The database is away." })).toBe(
+    `The server cannot store anything at the moment. ${waits} Sent when it can store again.`,
+  );
+});
+
 test("a refusal says why, and what is with the edits", () => {
   const link = { state: "refused", unsaved: 1, kept: true, seq: 3 } as const;
   expect(unsavedReason({ ...link, why: "session-ended" })).toBe(

@@ -17,9 +17,9 @@ export function unsavedReason(link: RoomLink): string | null {
       return `${refusals[link.why ?? "not-accepted"]}${keeps}`;
     case "connecting":
     case "offline": {
-      const why = link.why === undefined ? "The server does not answer." : refusals[link.why];
+      const why = link.why === undefined ? "The server does not answer." : awaySentence(link);
       if (link.unsaved === 0) return link.state === "connecting" ? null : why;
-      return `${why}${keeps} Sent when the server answers again.`;
+      return `${why}${keeps} ${sentWhen(link.why)}`;
     }
   }
 }
@@ -47,9 +47,23 @@ const refusals: Readonly<Record<RefusalReason, string>> = {
   "not-accepted": "The server refused a change.",
   restarting: "The server restarts.",
   "too-slow": "The connection is too slow.",
+  "no-network": "This device has no network.",
+  proxy: "The proxy in front of the server cannot reach the server.",
+  "not-stored": "The server cannot store anything at the moment.",
   "no-socket":
     "The server answers, but no live connection to it opens: a proxy in between may not pass WebSockets on.",
 };
+
+/** The words about a proxy say more than ours; those about a database are for owners. */
+function awaySentence({ why, said }: RoomLink): string {
+  if (why === "proxy" && said !== undefined) return said;
+  return refusals[why ?? "no-socket"];
+}
+
+function sentWhen(why: RefusalReason | undefined): string {
+  if (why === "not-stored") return "Sent when it can store again.";
+  return why === "no-network" ? "Sent when there is one." : "Sent when the server answers again.";
+}
 
 function where(link: RoomLink): string {
   const edits = changes(link.unsaved);

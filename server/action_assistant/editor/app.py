@@ -159,7 +159,9 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     view_links = ViewLinks(settings.data, keys, revoked, "graph")
     codes = DeviceCodes(limits=settings.limits)
     addresses = _addresses(settings)
-    monitoring = Monitoring("editor", settings.data)
+    public = settings.reached.public
+    page = public.page if public is not None else ""
+    monitoring = Monitoring("editor", settings.data, page=page)
     audit = AuditLog()
     monitoring.requests.refused_stranger = audit.refused_stranger
 
@@ -306,7 +308,13 @@ class WatchedEditor(Watched):
     def __init__(self, services: EditorServices) -> None:
         workers, self._rooms = services.workers, services.rooms
         lanes = (workers.files, workers.edits, workers.graphs)
-        super().__init__(services.journal, lanes, (services.rooms.metrics,), {})
+        super().__init__(
+            services.journal,
+            lanes,
+            (services.rooms.metrics,),
+            {},
+            services.notifications.receivers,
+        )
 
     def activity(self) -> Activity:
         """Return how many sockets and rooms of the editor are open."""

@@ -46,7 +46,7 @@ log: Final = logging.getLogger(__name__)
 MaySee: TypeAlias = Callable[[str, str], Awaitable[bool]]
 
 #: The kinds of messages that the editor sends.
-KINDS: Final = ("mention",)
+KINDS: Final = ("mention", "server.fault")
 #: Persons that one comment can mention; others in it are ignored.
 MOST: Final = 20
 _LOOK_S: Final = 2.0

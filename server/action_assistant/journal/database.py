@@ -1,8 +1,9 @@
 """The interface between a journal and its database, SQLite or Postgres."""
 
+import errno
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol, TypeAlias, TypeVar
+from typing import Any, Final, Literal, Protocol, TypeAlias, TypeVar
 
 from sqlalchemy import Connection
 from sqlalchemy.exc import DBAPIError
@@ -123,9 +124,25 @@ class Database(Protocol):
         """Release the lock, so that another process may write."""
 
 
+#: Errors of a connection to a database server, in words: SQLite has no connection.
+_AWAY: Final = {
+    errno.ENOENT: "its socket is gone: it has ended, or not begun",
+    errno.ECONNREFUSED: "nothing listens there",
+    errno.ECONNRESET: "it ended the connection",
+    errno.EPIPE: "it ended the connection",
+    errno.EHOSTUNREACH: "no way leads to it",
+    errno.ENETUNREACH: "no way leads to it",
+    errno.ETIMEDOUT: "nothing came back in time",
+}
+
+
 def cause_of(error: Exception) -> str:
     """Return the text of an error of a database or disk, without a full stop."""
     cause: object = error.orig if isinstance(error, DBAPIError) else error
+    if isinstance(cause, TimeoutError):
+        return "the database server does not answer in time"
+    if isinstance(cause, OSError) and cause.errno in _AWAY:
+        return f"the database server does not answer ({_AWAY[cause.errno]})"
     if isinstance(cause, OSError) and cause.errno is not None:
         return os.strerror(cause.errno)
     return str(cause).strip().rstrip(".") or type(cause).__name__

@@ -41,6 +41,7 @@ T = TypeVar("T")
 
 _READERS: Final = 3  # threads, each with a connection
 _WAIT: Final = 5.0  # seconds for a lock that only a foreign process could hold
+_FULL: Final = 1 << 20  # bytes; with less, SQLite cannot make the files beside a database
 _PRAGMAS: Final = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON")
 _PAGES: Final = 1000  # of the write-ahead log that a checkpoint is to copy at once
 _MOST_PAGES: Final = 16_384  # in the log, beyond which commits copy it themselves
@@ -240,7 +241,7 @@ class Sqlite:
         try:
             return self.connect()
         except self.faults as error:
-            raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
+            raise CannotStart(f"Cannot open {self._the}: {self._why(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Call `question` with a read-only connection to the file, if it exists. A normal
@@ -256,7 +257,7 @@ class Sqlite:
             except CannotStart as error:  # of the file that it is, also where a copy was read
                 raise type(error)(str(error).replace(str(path), str(self._path))) from error
             except self.faults as error:
-                raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
+                raise CannotStart(f"Cannot open {self._the}: {self._why(error)}.") from error
             finally:
                 engine.dispose()
 
@@ -269,9 +270,25 @@ class Sqlite:
             with engine.begin() as connection:
                 return upgrade(connection)
         except self.faults as error:
-            raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
+            raise CannotStart(f"Cannot open {self._the}: {self._why(error)}.") from error
         finally:
             engine.dispose()
+
+    def _why(self, error: Exception) -> str:
+        """Return the text of an error of this file. SQLite calls a full disk an I/O error where it
+        cannot make the files beside the database."""
+        said = cause_of(error)
+        if said not in {
+            "disk I/O error",
+            "unable to open database file",
+            "database or disk is full",
+        }:
+            return said
+        try:
+            free = shutil.disk_usage(self._path.parent).free
+        except OSError:
+            return said
+        return f"the disk is full ({free >> 10} KiB are free)" if free < _FULL else said
 
     def _make(self) -> None:
         """Create an empty file if it does not exist, only for this user; SQLite gives the files

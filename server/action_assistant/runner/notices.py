@@ -27,7 +27,14 @@ from action_assistant.web.notifications.receivers import Receiver
 log: Final = logging.getLogger(__name__)
 
 #: The kinds of messages that the runner sends.
-KINDS: Final = ("run.ended", "run.stop_unconfirmed", "robot.lost", "run.held", "approval.asked")
+KINDS: Final = (
+    "run.ended",
+    "run.stop_unconfirmed",
+    "robot.lost",
+    "run.held",
+    "approval.asked",
+    "server.fault",
+)
 #: The code of the alarm of a Stop without proof.
 _UNCONFIRMED: Final = "stop_unconfirmed"
 _FAILED: Final = {

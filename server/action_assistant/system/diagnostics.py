@@ -47,6 +47,8 @@ CODES: Final[Mapping[str, Severity]] = {
     "backup-old": "warning",
     # the databases
     "schema-newer": "error",
+    "schema-older": "warning",
+    "schema-room": "error",
     "database-foreign": "error",
     "database-unreadable": "error",
     "database-lost": "error",

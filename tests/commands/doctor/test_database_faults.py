@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant.editor.log import database_location
+from action_assistant.journal.migrate import revisions_of
 from support.doctor import fault, faults
 
 
@@ -39,6 +40,16 @@ def test_tables_of_a_newer_version_are_named(data: Path, branch: str) -> None:
     assert (found.code, found.where) == ("schema-newer", str(data / f"{branch}.db"))
     assert f"{branch}_9999" in found.message
     assert found.remedy.startswith("Install that version again")
+
+
+@pytest.mark.parametrize("branch", ["editor", "runner"])
+def test_what_the_next_start_changes_is_said_before(data: Path, branch: str) -> None:
+    older, newest = revisions_of(branch)[-2:]
+    altered(data / f"{branch}.db", f"UPDATE alembic_version SET version_num = '{older}'")
+    found = fault(data)
+    assert (found.code, found.where) == ("schema-older", str(data / f"{branch}.db"))
+    assert f"those of {older}; the next start changes them to {newest}" in found.message
+    assert "for which there is room" in found.message
 
 
 def test_a_database_of_another_program_and_one_that_is_none_are_told_apart(data: Path) -> None:

@@ -100,7 +100,7 @@ async def test_a_change_that_cannot_be_stored_reaches_nobody(
         ada.speak()
         assert ada.member is not None
         assert bob.member is not None
-        assert await ada.member.ended() == await bob.member.ended() == messages.RESTARTING
+        assert await ada.member.ended() == await bob.member.ended() == messages.NOT_STORED
         await bob.listen()
         assert bob.things == {}
         assert await journal.newest(STREAM) == 0

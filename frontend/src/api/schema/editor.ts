@@ -672,6 +672,17 @@ export interface EditorApi {
         reasons: EditorApi["FlatteningReason"][];
     };
     /**
+     * Fault
+     * @description Something that a person has to mend. `what`: a stable name; `text`: a sentence; `since`: when
+     *     this process saw it first.
+     */
+    Fault: {
+        what: string;
+        text: string;
+        /** Format: date-time */
+        since: string;
+    };
+    /**
      * Field
      * @description A field that has another value than before. `before` or `after` is null if the field had no
      *     value then.
@@ -1890,7 +1901,8 @@ export interface EditorApi {
     };
     /**
      * ProcessStatus
-     * @description The present state of one of the two processes. Only the editor knows `backups`.
+     * @description The present state of one of the two processes. Only the editor knows `backups`. `faults`: what
+     *     a person has to mend.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -1907,6 +1919,7 @@ export interface EditorApi {
         workers: EditorApi["LaneState"][];
         activity: EditorApi["Activity"];
         backups: EditorApi["BackupsShown"] | null;
+        faults: EditorApi["Fault"][];
     };
     /**
      * ProcessVersions

@@ -715,6 +715,17 @@ export interface RunnerApi {
         how: string;
     };
     /**
+     * Fault
+     * @description Something that a person has to mend. `what`: a stable name; `text`: a sentence; `since`: when
+     *     this process saw it first.
+     */
+    Fault: {
+        what: string;
+        text: string;
+        /** Format: date-time */
+        since: string;
+    };
+    /**
      * Field
      * @description A field that has another value than before. `before` or `after` is null if the field had no
      *     value then.
@@ -1391,7 +1402,8 @@ export interface RunnerApi {
     };
     /**
      * ProcessStatus
-     * @description The present state of one of the two processes. Only the editor knows `backups`.
+     * @description The present state of one of the two processes. Only the editor knows `backups`. `faults`: what
+     *     a person has to mend.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -1408,6 +1420,7 @@ export interface RunnerApi {
         workers: RunnerApi["LaneState"][];
         activity: RunnerApi["Activity"];
         backups: RunnerApi["BackupsShown"] | null;
+        faults: RunnerApi["Fault"][];
     };
     /**
      * ProcessVersions

@@ -3,6 +3,7 @@
 Files are looked at without opening them for writing, and of the events the newest: `verify` looks at all.
 """
 
+import shutil
 import socket
 import time
 from collections.abc import Iterator, Sequence
@@ -20,10 +21,11 @@ from action_assistant.editor.log import database_location
 from action_assistant.editor.log.epochs import MARK, marked
 from action_assistant.errors import AnothersDatabase, CannotStart, NewerSchema
 from action_assistant.journal.chain import NOTHING, Head, link
+from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.database import Database, cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Event
-from action_assistant.journal.migrate import recognize
+from action_assistant.journal.migrate import recognize, revisions_of
 from action_assistant.journal.postgres import weakness
 from action_assistant.schema.editor_tables import editor_event, editor_head, graph
 from action_assistant.system.diagnostics import Diagnostic, fine, found
@@ -220,7 +222,7 @@ def graphs_are_there(place: Installation) -> Iterator[Diagnostic]:
         return
     file = Path(make_url(url).database or "")
     if file.exists():
-        yield from _in_file("graphs", file)
+        yield from _in_file("graphs", file, data)
     elif database_location.remembered(data) or _holds_events(data / "runner.db"):
         yield found(
             "database-lost",
@@ -240,7 +242,7 @@ def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
     file = place.data / "runner.db"
     left = [place.data / name for name in ("archive", "recordings")]
     if file.exists():
-        yield from _in_file("runs", file)
+        yield from _in_file("runs", file, place.data)
     elif any(each.is_dir() and any(each.iterdir()) for each in left):
         yield found(
             "database-lost",
@@ -255,9 +257,11 @@ def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
 class _DatabaseFindings(msgspec.Struct):
     """The results of one examination of a database. `damage`: a clause, "" for none; `newest`: when
     the newest event was written (microseconds since 1970); `weak`: why nothing may be written, ""
-    for no reason; `lacks`: events that the data folder has seen are missing."""
+    for no reason; `older`: the revision of its tables, that of this program, and the bytes that it has,
+    where these differ; `lacks`: events that the data folder has seen are missing."""
 
     damage: str = ""
+    older: tuple[str, str, int] | None = None
     newest: int | None = None
     weak: str = ""
     lacks: bool = False
@@ -274,7 +278,7 @@ def _holds_events(file: Path) -> bool:
     return any(held)
 
 
-def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
+def _in_file(what: str, file: Path, data: Path) -> Iterator[Diagnostic]:
     database = database_of(f"sqlite:///{file}")
     seen = _DatabaseFindings()
     try:
@@ -282,17 +286,22 @@ def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
     except CannotStart as error:
         yield _refused(file, error)
         return
-    problems = [*_events(what, file, seen)]
+    problems = [*_upgrade(file, data, seen), *_events(what, file, seen)]
     yield from problems
     if not problems:
         yield fine(file, f"The database of {what} can be read; its newest events are sound.")
 
 
 def _examine(database: Database, connection: Connection, seen: _DatabaseFindings) -> None:
-    """Look for damage and for the newest event in the database behind `connection`, and write both
+    """Look for damage, the newest event and older tables in the database behind `connection`, and write all
     into `seen`; an empty database leaves `seen` as it is. Raise CannotStart for a database of
     another program or of a newer version."""
-    if recognize(connection):
+    current = max(recognize(connection), default="")
+    if current:
+        ours = revisions_of(current.partition("_")[0])[-1]
+        if current != ours:
+            size = sum(database.bytes_in_use(connection).values())
+            seen.older = current, ours, size
         seen.damage = first_damage(database, connection)
         seen.newest = newest_at(connection)
 
@@ -310,6 +319,31 @@ def _refused(where: object, error: CannotStart) -> Diagnostic:
         str(error),
         "Mend the rights of the file if they are the reason; else restore a backup.",
     )
+
+
+def _upgrade(where: object, data: Path, seen: _DatabaseFindings) -> Iterator[Diagnostic]:
+    """Yield what the next start does to tables of an earlier version. `data`: the data folder, which
+    gets the copy."""
+    if seen.older is None:
+        return
+    current, ours, size = seen.older
+    says = (
+        f"Its tables are those of {current}; the next start changes them to {ours}, after a copy of "
+        f"{max(1, size >> 20)} MiB into {data / before_upgrade.FOLDER}"
+    )
+    free = shutil.disk_usage(data).free
+    if size + before_upgrade.ROOM > free:
+        needs = (
+            f"which needs {(size + before_upgrade.ROOM) >> 20} MiB, and {free >> 20} MiB are left"
+        )
+        yield found("schema-room", where, f"{says}, {needs}.", "Make room before you start it.")
+    else:
+        yield found(
+            "schema-older",
+            where,
+            f"{says}, for which there is room.",
+            "Make a backup before, and start it once no robot moves.",
+        )
 
 
 def _events(what: str, where: object, seen: _DatabaseFindings) -> Iterator[Diagnostic]:
@@ -357,7 +391,7 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
     except database.faults as error:
         yield fault(shown, error)
         return
-    problems = [*_events("graphs", shown, seen)]
+    problems = [*_upgrade(shown, data, seen), *_events("graphs", shown, seen)]
     if seen.lacks:
         problems.append(
             found(

@@ -32,6 +32,7 @@ FORBIDDEN: Final = 4403
 NO_SUCH_GRAPH: Final = 4404
 OTHER_EPOCH: Final = 4409
 FULL: Final = 4413
+NOT_STORED: Final = 4503
 
 REASONS: Final = {
     UNREADABLE: "only binary messages",
@@ -44,6 +45,7 @@ REASONS: Final = {
     NO_SUCH_GRAPH: "no such graph",
     OTHER_EPOCH: "other epoch",
     FULL: "the graph is full",
+    NOT_STORED: "nothing can be stored now, come again",
 }
 
 #: The reason of a close with FORBIDDEN after which a page reconnects with another client id.

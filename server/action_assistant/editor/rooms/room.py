@@ -479,7 +479,8 @@ class Room:
                 log.error("%s: an edit could not be stored: %s", self.stream, error.detail)
             elif not isinstance(error, _ENDS):
                 log.error("%s: the room failed", self.stream, exc_info=error)
-        self._end(reason)
+        is_away = isinstance(error, Unavailable)
+        self._end(reason, messages.NOT_STORED if is_away else messages.RESTARTING)
         if isinstance(error, _ENDS):
             raise error
 
@@ -613,9 +614,9 @@ class Room:
         loaded = await load(self._journal, self.stream, run_in_worker=self._run_in_worker)
         self._replica, self.seq = loaded.replica, loaded.seq
 
-    def _end(self, reason: Refused) -> None:
-        """End the room: fail all requests with `reason`, and close all sockets, so that clients
-        reconnect."""
+    def _end(self, reason: Refused, code: int = messages.RESTARTING) -> None:
+        """End the room: fail all requests with `reason`, and close all sockets with `code`, so that
+        clients reconnect."""
         if self._ended:
             return
         self._ended = True
@@ -629,5 +630,5 @@ class Room:
             self._slow_work.cancel()
         self._idle.set()
         for member in self.members:
-            member.close(messages.RESTARTING)
+            member.close(code)
         self._on_end(self)

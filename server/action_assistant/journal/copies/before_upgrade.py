@@ -30,7 +30,8 @@ log: Final = logging.getLogger(__name__)
 
 FOLDER: Final = "before-upgrade"
 _KEPT: Final = 3  # of each journal, and so many revisions
-_ROOM: Final = 64 << 20  # bytes that have to be left on the disk
+#: Bytes that have to be left on the disk beside a copy.
+ROOM: Final = 64 << 20
 _PAGES: Final = 5_000  # copied between two reports of progress
 _ROWS: Final = 64  # in memory: an event has up to a MiB
 _EVERY: Final = 1.0  # seconds between two reports of progress
@@ -147,8 +148,8 @@ def _refusal(folder: Path, why: str) -> str:
 
 def _check_room(folder: Path, size: int) -> None:
     free = shutil.disk_usage(folder).free
-    if size + _ROOM > free:
-        why = f"it needs {(size + _ROOM) >> 20} MiB, and {free >> 20} MiB are left"
+    if size + ROOM > free:
+        why = f"it needs {(size + ROOM) >> 20} MiB, and {free >> 20} MiB are left"
         raise CannotStart(_refusal(folder, why))
 
 

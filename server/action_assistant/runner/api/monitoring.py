@@ -177,7 +177,13 @@ class WatchedRunner(Watched):
     def __init__(self, services: RunnerServices, folders: Mapping[str, Path]) -> None:
         self._control, self._hub = services.control, services.hub
         self._metrics = RunMetrics(services.control)
-        super().__init__(services.journal, services.lanes, (self._metrics,), folders)
+        super().__init__(
+            services.journal,
+            services.lanes,
+            (self._metrics,),
+            folders,
+            services.notifications.receivers,
+        )
 
     def activity(self) -> Activity:
         """Return how many pages, runs and unconfirmed Stops there are, and the state of each

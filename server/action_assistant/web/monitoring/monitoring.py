@@ -23,6 +23,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.journal.migrate import revisions_of
 from action_assistant.version import VERSION
 from action_assistant.web.http.requests import RequestCounts
+from action_assistant.web.monitoring.faults import FaultWatch, watch_of
 from action_assistant.web.monitoring.gauges import Family, Looked
 from action_assistant.web.monitoring.readiness import Check, DiskCheck, Parts, Readiness
 from action_assistant.web.monitoring.status import (
@@ -37,6 +38,7 @@ from action_assistant.web.monitoring.status import (
     versions,
 )
 from action_assistant.web.monitoring.storage import StorageWatch, backups_shown
+from action_assistant.web.notifications.receivers import Receiver
 from action_assistant.web.workers.lanes import Lane
 
 _TICK_S: Final = 0.25
@@ -46,7 +48,7 @@ _BUCKETS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2
 
 class Watched:
     """The parts of an open process that monitoring reads: its journal, its workers (the last lane
-    counts `folders`), and its own metrics."""
+    counts `folders`), its own metrics, and the receivers of its messages."""
 
     def __init__(
         self,
@@ -54,11 +56,13 @@ class Watched:
         lanes: Sequence[Lane],
         collectors: Sequence[Collector],
         folders: Mapping[str, Path],
+        receivers: Sequence[Receiver] = (),
     ) -> None:
         self.journal: Final = journal
         self.lanes: Final = lanes
         self.collectors: Final = collectors
         self.folders: Final = folders
+        self.receivers: Final = receivers
 
     def families(self) -> Iterator[Family]:
         """Yield the metrics that are computed at each request of them. A subclass implements this."""
@@ -110,9 +114,11 @@ disable_created_metrics()  # type: ignore[no-untyped-call]  # each counter and h
 
 
 class Monitoring:
-    """Collects the metrics, readiness and status of one process."""
+    """Collects the metrics, readiness and status of one process. `page`: the public URL of the page,
+    "" if there is none."""
 
-    def __init__(self, process: ProcessName, data: Path) -> None:
+    def __init__(self, process: ProcessName, data: Path, *, page: str = "") -> None:
+        self._page = page
         self.requests: Final = RequestCounts()
         self._process = process
         self._data = data
@@ -122,6 +128,7 @@ class Monitoring:
         self._parts: Parts = {}
         self._watched: Watched | None = None
         self._storage: StorageWatch | None = None
+        self._faults: FaultWatch | None = None
         self._registry = CollectorRegistry()
         ProcessCollector(registry=self._registry)
         self._registry.register(self._lag)
@@ -138,11 +145,20 @@ class Monitoring:
             watched.lanes[-1],
             backups=self._process == "editor",
         )
+        faults = self._faults = watch_of(
+            self._process,
+            self._data,
+            watched.journal,
+            watched.receivers,
+            page=self._page,
+            storage=lambda: (storage.found, storage.backups),
+        )
         for each in (watched.journal.metrics, *watched.collectors):
             self._registry.register(each)
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._lag.run)
             tasks.start_soon(storage.run)
+            tasks.start_soon(faults.run)
             yield
             tasks.cancel_scope.cancel()
 
@@ -192,6 +208,7 @@ class Monitoring:
             workers=lane_states(watched.lanes),
             activity=watched.activity(),
             backups=backups_shown(storage.backups),
+            faults=self._faults.found if self._faults is not None else (),
         )
 
     def _families(self) -> Iterator[Family]:

@@ -14,6 +14,7 @@ from action_assistant.safe_text import hold_names
 from action_assistant.system import posix
 from action_assistant.system.posix import resource
 from action_assistant.version import VERSION
+from action_assistant.web.monitoring.faults import Fault
 from action_assistant.web.monitoring.readiness import Readiness
 from action_assistant.web.monitoring.storage import BackupsShown, Storage
 from action_assistant.web.workers.lanes import Lane
@@ -100,7 +101,8 @@ class Activity(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """The present state of one of the two processes. Only the editor knows `backups`."""
+    """The present state of one of the two processes. Only the editor knows `backups`. `faults`: what
+    a person has to mend."""
 
     process: ProcessName
     at: datetime
@@ -113,6 +115,7 @@ class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
     workers: Sequence[LaneState]
     activity: Activity
     backups: BackupsShown | None = None
+    faults: Sequence[Fault] = ()
 
 
 def began_at() -> datetime:
