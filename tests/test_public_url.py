@@ -63,6 +63,20 @@ def test_only_the_address_itself_names_it() -> None:
     assert not lab.is_named("other.example", 8443)
 
 
+@pytest.mark.parametrize(
+    ("text", "is_signed_for"),
+    [
+        ("https://robots.example.org/temoto/", True),
+        ("https://lab.local", False),  # its own authority may end
+        ("https://10.0.0.2/", False),
+        ("https://[fd00::2]/", False),
+        ("http://lab.local/", False),
+    ],
+)
+def test_only_https_at_a_public_name_is_for_ever(text: str, is_signed_for: bool) -> None:
+    assert public_url(text).is_signed_for is is_signed_for
+
+
 def test_behind_a_public_address_the_proxies_of_this_computer_are_believed_unless_others_are() -> (
     None
 ):

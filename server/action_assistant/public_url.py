@@ -69,6 +69,13 @@ class PublicUrl(msgspec.Struct, frozen=True):
         return self.page + RUNNER
 
     @property
+    def is_signed_for(self) -> bool:
+        """Return whether it is https under a name that a public authority signs for, so that browsers
+        may be told never to use http there."""
+        is_name = "." in self.host and ":" not in self.host and not self.host[-1].isdigit()
+        return self.is_secure and is_name and not self.host.endswith(_OF_A_NETWORK)
+
+    @property
     def is_secure(self) -> bool:
         """Return whether the way to the proxy is encrypted."""
         return self.scheme == "https"

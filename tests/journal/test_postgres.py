@@ -106,6 +106,19 @@ async def test_immediate_stops_under_load_lose_nothing_and_double_nothing(mortal
     await journal.close()
 
 
+async def test_a_server_that_is_away_is_said_once(
+    mortal: Server, caplog: pytest.LogCaptureFixture
+) -> None:
+    journal = await opened(mortal.url("aa"))
+    await asyncio.to_thread(mortal.stop, "fast")
+    for _ in range(3):
+        with pytest.raises(Unavailable):
+            await journal.append("a", [draft()])
+    lines = [each for each in caplog.records if each.levelname == "ERROR"]
+    assert 1 <= len(lines) <= 2, "the end of the connection, and that nobody answers"
+    await journal.close()
+
+
 async def test_while_the_server_is_down_appends_and_reads_fail_at_once(mortal: Server) -> None:
     journal = await opened(mortal.url("aa"))
     await journal.append("a", [draft()])

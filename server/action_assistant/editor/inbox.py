@@ -130,11 +130,14 @@ class Inboxes:
             tasks.cancel_scope.cancel()
 
     async def _keep_up(self) -> None:
+        said = ""
         while True:
             try:
                 await self.find()
+                said = ""
             except Refused as error:
-                log.warning("mentions are not looked for: %s", error.detail)
+                if said != (said := error.detail):  # once, until it works again
+                    log.warning("mentions are not looked for: %s", error.detail)
             except Exception:  # whatever the log holds, the editor is not ended by it
                 log.exception("mentions cannot be looked for")
             await anyio.sleep(_LOOK_S)

@@ -282,10 +282,13 @@ class Writer:
         except Exception as error:  # the thread lives on, and all callers get the error
             # After a failed commit it is unknown what the disk holds: read it again.
             ours = not isinstance(error, self._database.faults)
-            log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
+            why = cause_of(error)
+            is_known = not ours and why == self.metrics.failing  # said once, until it works again
+            level = logging.DEBUG if is_known else logging.ERROR
+            log.log(level, "%s was not written: %s", self._database.name, why, exc_info=ours)
             self._disconnect()
             done = self._settled(transaction, done, len(jobs), error)
-            self.metrics.failed(len(jobs), cause_of(error))
+            self.metrics.failed(len(jobs), why)
         else:
             self.metrics.over(len(jobs), [events for _, failed, events in done if failed is None])
         return list(zip(jobs, done, strict=True))
@@ -317,12 +320,14 @@ class Writer:
         table = editor_tables.editor_event
         found = select(table.c.chain).where(table.c.position == event.position)
         until = time.monotonic() + self._database.patience
+        said = ""
         while True:
             try:
                 session, _ = self._connected()
                 return session.run(partial(_scalar, session, found)) == chain
             except self._database.faults as error:
-                log.warning("%s does not answer: %s", self._database.name, cause_of(error))
+                if said != (said := cause_of(error)):
+                    log.warning("%s does not answer: %s", self._database.name, said)
                 self._disconnect()
             if time.monotonic() > until:
                 return None

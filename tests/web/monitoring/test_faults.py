@@ -28,21 +28,27 @@ from action_assistant.web.monitoring.faults import (
     storage_faults,
 )
 from action_assistant.web.monitoring.storage import Storage
-from action_assistant.web.notifications.receivers import receivers_of
+from action_assistant.web.notifications.receivers import Mailbox
 
 pytestmark = pytest.mark.anyio
 
 DAY = 24 * 3600.0
-RECEIVERS = """
-[webhooks.chat]
-url = "https://chat.example.org/x"
-secret = "whsec_MDEyMzQ1Njc4OTAxMjM0NTY3ODkwMTIz"
-kinds = ["server.fault"]
-[webhooks.others]
-url = "https://other.example.org/x"
-secret = "whsec_MDEyMzQ1Njc4OTAxMjM0NTY3ODkwMTIz"
-kinds = ["mention"]
-"""
+
+
+def mailbox(name: str, kind: str) -> Mailbox:
+    """Return a receiver of one kind of messages."""
+    return Mailbox(
+        name=name,
+        kinds=frozenset({kind}),
+        host="mail.example.org",
+        port=587,
+        security="starttls",
+        sender="a@example.org",
+        to=("b@example.org",),
+    )
+
+
+RECEIVERS = (mailbox("chat", "server.fault"), mailbox("others", "mention"))
 
 
 @pytest.fixture
@@ -63,17 +69,15 @@ async def messages(journal: Journal) -> list[tuple[str, str]]:
 
 
 async def test_a_fault_that_lasts_is_told_once_a_day_to_who_wants_it(
-    journal: Journal, tmp_path: Path
+    journal: Journal,
 ) -> None:
-    file = tmp_path / "notifications.toml"
-    file.write_text(RECEIVERS)
     now, texts = 1_000_000.0, {"disk": "Little is left."}
 
     async def look() -> dict[str, str]:
         return texts
 
     def watching() -> FaultWatch:
-        return FaultWatch(journal, receivers_of(file), [look], clock=lambda: now)
+        return FaultWatch(journal, RECEIVERS, [look], clock=lambda: now)
 
     watch = watching()
     await watch.look()

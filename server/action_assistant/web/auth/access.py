@@ -529,6 +529,9 @@ class Access:
         name = request_id()
         if name is not None:
             extra.append((b"x-request-id", name.encode()))
+        public = self._addresses.public_at(headers.get("host", ""))
+        if public is not None and public.is_signed_for:
+            extra.append((b"strict-transport-security", b"max-age=31536000"))
         policy = self._policy(headers.get("host", ""), path).encode("latin-1", "replace")
 
         async def dressed(message: Message) -> None:
