@@ -123,7 +123,7 @@ class FaultWatch:
             for receiver in self._receivers:
                 if not _was_told(connection, receiver, fault.what, at - _AGAIN_US):
                     id_ = f"fault/{fault.what}:{at}:{receiver}"
-                    facts = {"what": fault.what, "text": fault.text}
+                    facts = {"what": fault.what, "why": fault.text}
                     connection.execute(
                         insert(_outbox), row(id_, receiver, KIND, fault.what, at, facts)
                     )

@@ -50,7 +50,7 @@ KINDS: Final[Mapping[str, Kind]] = {
     "approval.asked": Kind(
         "{person} asks a second person to say yes to {graph} for {robot}.", "/graphs/{id}"
     ),
-    "server.fault": Kind("The server needs a person. {text}", "/admin"),
+    "server.fault": Kind("The server needs a person. {why}", "/admin"),
     "mention": Kind(
         "{person} has mentioned {people} in a comment on {graph}.", "/graphs/{id}?comment={key}"
     ),
