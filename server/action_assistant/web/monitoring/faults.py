@@ -53,7 +53,7 @@ _PARTS: Final = ("database", "writer", "schema", "disk", "recording")
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """Something that a person has to mend. `what`: a stable name; `text`: a sentence; `since`: when
+    """A condition that a person has to mend. `what`: a stable name; `text`: a sentence; `since`: when
     this process saw it first."""
 
     what: str
