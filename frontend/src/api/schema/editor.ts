@@ -673,7 +673,7 @@ export interface EditorApi {
     };
     /**
      * Fault
-     * @description Something that a person has to mend. `what`: a stable name; `text`: a sentence; `since`: when
+     * @description A condition that a person has to mend. `what`: a stable name; `text`: a sentence; `since`: when
      *     this process saw it first.
      */
     Fault: {
