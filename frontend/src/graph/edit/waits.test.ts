@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import type * as Y from "yjs";
 import { actionIn, docWith, graphIn } from "../../testing/edited-graph";
 import { relationId } from "../document-keys";
-import { ENTRY, EXIT, type Key, type Precondition, spokenOutcomes } from "../model";
+import { ENTRY, EXIT, type Key, type Precondition, type Relation, spokenOutcomes } from "../model";
 import {
   addAction,
   addParameter,
@@ -259,7 +259,7 @@ function drawnBy(all: readonly Gesture[]): Y.Doc {
   setEntry(doc, first);
   for (const [kind, one, other, when] of all) {
     const [from, to] = [pick(one), pick(other)];
-    const relations = graphIn(doc).relations.filter(({ parent }) => parent !== ENTRY);
+    const relations = inOrder(doc).filter(({ parent }) => parent !== ENTRY);
     const relation = relations[one % Math.max(1, relations.length)];
     if (kind === "grow") connect(doc, from, add(), when);
     else if (kind === "join" && ahead(from, to)) connect(doc, from, to, when);
@@ -287,23 +287,27 @@ function drawnBy(all: readonly Gesture[]): Y.Doc {
   return doc;
 }
 
+/** Returns the arrows by the names of their parents, in the order in which each starts its children. */
+function inOrder(doc: Y.Doc): Relation[] {
+  const named = (key: Key) => actionIn(doc, key)?.name ?? key;
+  return [...graphIn(doc).relations].sort(
+    (a, b) => named(a.parent).localeCompare(named(b.parent)) || a.parentOrder - b.parentOrder,
+  );
+}
+
 /** One line for each arrow: parent, child, its outcomes, and `?` if it is not waited for. */
 function arrowsOf(doc: Y.Doc): string[] {
-  const graph = graphIn(doc);
-  const names = new Map(graph.actions.map(({ key, name }) => [key, name]));
-  const named = (key: Key) => names.get(key) ?? key;
-  return [...graph.relations]
-    .sort((a, b) => a.parentOrder - b.parentOrder)
-    .map(({ parent, child, conditions, required }) =>
-      [
-        named(parent),
-        named(child),
-        spokenOutcomes(conditions)
-          .map((outcome) => outcome.slice(3))
-          .join("/"),
-        ...(required ? [] : ["?"]),
-      ].join(" "),
-    );
+  const named = (key: Key) => actionIn(doc, key)?.name ?? key;
+  return inOrder(doc).map(({ parent, child, conditions, required }) =>
+    [
+      named(parent),
+      named(child),
+      spokenOutcomes(conditions)
+        .map((outcome) => outcome.slice(3))
+        .join("/"),
+      ...(required ? [] : ["?"]),
+    ].join(" "),
+  );
 }
 
 /** True if what follows on_true leads in a circle, which never ends when every action ends true. */
