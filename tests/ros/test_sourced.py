@@ -142,12 +142,13 @@ def reached(port: int, robot: dict[str, Any]) -> None:
 def runner_of(pid: int) -> int:
     """The runner among what a command started; itself, if it is one."""
     family = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
-    (found,) = [
+    runners = [
         each.pid
         for each in family
         if "runner" in each.cmdline() and "action_assistant" in " ".join(each.cmdline())
-    ] or [pid]
-    return found
+    ]
+    # Its fork server, a child of it, has its command line.
+    return runners[0] if runners else pid
 
 
 def test_make_run_in_a_sourced_shell_reaches_a_robot_with_the_workspaces_messages(
