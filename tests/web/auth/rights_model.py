@@ -39,7 +39,10 @@ NEEDED: Final[tuple[tuple[str, Permission | None], ...]] = (
     (r"^editor (post|patch|delete) /api/(groups|members)\b|^runner put /api/members", "share"),
     (r" get ", "see"),
     (r" (post|patch|delete) /api/robots(/\{name\})?$", "register"),
-    (r"^runner post /api/(preflight|asked_inputs|runs|runs/\{run\}/(modify|pause|resume))$", "simulate"),
+    (
+        r"^runner post /api/(preflight|asked_inputs|runs|runs/\{run\}/(modify|pause|resume))$",
+        "simulate",
+    ),
     (r"^runner \w+ /api/(approvals|groups|robots/.*)", "operate"),
     (r" /api/runs/\{run\}/(at_rest|go_on|step|wait|hand_over|outcome|breakpoints)$", "operate"),
     # What is one's own, and what answers without changing anything.
