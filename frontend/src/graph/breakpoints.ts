@@ -119,7 +119,7 @@ function parts({ visit, outcomes, value }: Breakpoint): string[] {
 }
 
 /** Return the conditions of a breakpoint in a few words; "" for none. */
-export const conditionWords = (breakpoint: Breakpoint): string => parts(breakpoint).join(", ");
+const conditionWords = (breakpoint: Breakpoint): string => parts(breakpoint).join(", ");
 
 /** Return what a breakpoint does, as one sentence without a full stop. `on`: an arrow or an action. */
 export function breakpointWords(breakpoint: Breakpoint, on: "action" | "arrow"): string {

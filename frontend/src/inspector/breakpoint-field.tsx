@@ -40,7 +40,7 @@ const wholeVisit = (draft: string): string | null =>
     : "A whole number from 1 to 1,000,000; empty for each visit.";
 
 /** Return a typed value as the kind of value that it looks like. */
-export function typedValue(draft: string): ValueTest["value"] {
+function typedValue(draft: string): ValueTest["value"] {
   const text = draft.trim();
   if (text === "true" || text === "false") return text === "true";
   return text !== "" && Number.isFinite(Number(text)) ? Number(text) : draft;
