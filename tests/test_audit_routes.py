@@ -26,6 +26,7 @@ LOOKS: Final = {
     *("editor post /api/actions/{action_id}/umrf", "editor post /api/logins/look"),
     *("runner post /api/preflight", "runner post /api/expectations/check"),
     *("runner post /api/expectations/proposal", "runner post /api/runs/{run}/script"),
+    "runner post /api/asked_inputs",
 }
 #: Other exceptions, and why.
 EXCEPT: Final = {

@@ -292,7 +292,7 @@ def test_without_room_for_a_copy_nothing_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = old(tmp_path)
-    monkeypatch.setattr(before_upgrade, "_ROOM", 1 << 60)
+    monkeypatch.setattr(before_upgrade, "ROOM", 1 << 60)
     with pytest.raises(CannotStart, match=r"needs \d+ MiB.*Nothing was changed.*--without-copy"):
         place.opened()
     assert place.asked(recognize) == {"editor_0005"}

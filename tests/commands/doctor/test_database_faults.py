@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant.editor.log import database_location
+from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.migrate import revisions_of
 from support.doctor import fault, faults
 
@@ -50,6 +51,17 @@ def test_what_the_next_start_changes_is_said_before(data: Path, branch: str) -> 
     assert (found.code, found.where) == ("schema-older", str(data / f"{branch}.db"))
     assert f"those of {older}; the next start changes them to {newest}" in found.message
     assert "for which there is room" in found.message
+
+
+def test_an_upgrade_without_room_for_its_copy_is_an_error(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    older = revisions_of("editor")[-2]
+    altered(data / "editor.db", f"UPDATE alembic_version SET version_num = '{older}'")
+    monkeypatch.setattr(before_upgrade, "ROOM", 1 << 60)
+    found = fault(data)
+    assert (found.code, found.where) == ("schema-room", str(data / "editor.db"))
+    assert "MiB are left" in found.message
 
 
 def test_a_database_of_another_program_and_one_that_is_none_are_told_apart(data: Path) -> None:
