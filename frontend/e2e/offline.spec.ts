@@ -35,7 +35,9 @@ async function enter(page: Page, graph: string): Promise<void> {
 
 async function offline(page: Page, changes: number): Promise<void> {
   const words = changes === 1 ? "1 change" : `${changes} changes`;
-  await expect(page.getByText(new RegExp(`offline.*\\b${words}`, "i")).first()).toBeVisible();
+  await expect(
+    page.getByText(new RegExp(`(offline|server away).*\\b${words}`, "i")).first(),
+  ).toBeVisible();
 }
 
 /** The edits that wait on this device, by person, as the browser stores them. */

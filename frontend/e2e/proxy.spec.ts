@@ -267,7 +267,7 @@ test.describe("where the proxy is not as it should be", () => {
     await later.goto(`${proxy.url}/graphs/${graph}`);
     await expect(card(later, "Kept")).toBeVisible();
     await add(later, "Alone");
-    await expect(later.getByText(/offline.*1 change/i).first()).toBeVisible();
+    await expect(later.getByText(/(offline|server away).*1 change/i).first()).toBeVisible();
     await expect(later.getByRole("button", { name: /^Start v1: not connected/ })).toBeDisabled();
     await picture(later, "nginx-offline");
     await proxy.start(product.port);
