@@ -120,7 +120,7 @@ test("STOP is inside the screen and under nothing: each page, each width, idle, 
 }) => {
   test.slow();
   const { page, context, failures } = await product.person(browser, "Ada Lovelace", PHONE);
-  const graph = await product.chain(120);
+  const graph = await product.chain(60);
   const run = await running(page, graph);
   const routes = [
     `/runs/${run}`,
