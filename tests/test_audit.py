@@ -418,8 +418,8 @@ class Week:
         return found[0], found[1]
 
     def _confirm(self, guest: Guest) -> None:
-        """Somebody confirms on their other browser that it is they, or says that it is not. A few do:
-        who asks too often waits for a minute."""
+        """Have a person confirm on their other browser that it is they, or say that it is not. At most
+        four times: whoever asks more often has to wait for a minute."""
         self.confirmed += 1
         if self.confirmed > 4:
             return
@@ -457,7 +457,7 @@ class Week:
         self.fact(self.phone.id, "audit.passkey_changed.v1")
 
     def _provide(self, guest: Guest) -> None:
-        """Somebody comes by the identity provider, which lets them in or not. A few do."""
+        """Have a guest sign in by the identity provider, which lets them in or not. Only a few times."""
         assert guest.editor("GET", "/api/session/provider").is_success
         self.provided += 1
         if self.provided > 10:

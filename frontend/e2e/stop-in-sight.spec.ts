@@ -1,8 +1,9 @@
 /** STOP is in sight on each page, at each width, whatever goes on; and it outlives the page around it. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { saved, start } from "./canvas";
+import { saved } from "./canvas";
 import { LONG, Product } from "./product";
+import { post } from "./valves";
 
 const product = new Product();
 
@@ -26,13 +27,22 @@ const newest = async (): Promise<Run | undefined> =>
 const stateIs = (state: string) => expect.poll(async () => (await newest())?.state).toBe(state);
 const stopOf = (page: Page) => page.getByRole("button", { name: /^Stop / });
 
-/** A run of a minute, seen by the page of its graph. */
+/** A run that goes on until it is stopped, seen by the page of its graph. */
 async function running(page: Page, graph: string): Promise<string> {
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
-  await start(page);
+  const version = await post<{ id: string; digest: string; umrf: object }>(
+    product,
+    `/api/graphs/${graph}/versions`,
+    {},
+  );
+  const { id, digest, umrf } = version;
+  const order = { version: id, digest, umrf, graph, engine: "simulator" };
+  const script = { behaviours: { Wait_5: [{ never: true }] } };
+  const body = { ...order, script, request_id: crypto.randomUUID() };
+  const run = await post<Run>(product, "/api/runs", body, product.runnerUrl);
   await stateIs("running");
-  return (await newest())?.id ?? "";
+  return run.id;
 }
 
 /** Go to another address in place, as links do. */

@@ -1,4 +1,4 @@
-"""What a start asks for, and the graph with what people answer."""
+"""A start asks for values, and runs the graph with those that people give."""
 
 import json
 from typing import Any

@@ -106,7 +106,8 @@ anyio.run(main)
 
 
 def found_by_workers(*, prepared: bool) -> list[str]:
-    """What a worker of a new process finds, and one that is made after the fork server was killed."""
+    """Return what the worker of a new process finds in itself, and then what a worker finds that is
+    made after the fork server was killed. `prepared`: the fork server was forked at once."""
     tests = str(Path(__file__).parents[2])
     return subprocess.run(
         [sys.executable, "-c", _SCRIPT.format(prepared=prepared)],

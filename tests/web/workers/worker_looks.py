@@ -1,4 +1,4 @@
-"""What a worker finds in itself."""
+"""Functions by which tests ask a worker what it finds in itself."""
 
 import gc
 import os
@@ -7,8 +7,8 @@ from pathlib import Path
 
 
 def look(opened: int, path: str) -> str:
-    """Whether this process has modules that only its maker imported (`colorsys`), garbage collection,
-    and the file at `path` that its maker had open under this number."""
+    """Return a sentence that says whether this process has modules that only its maker imported
+    (`colorsys`), collects garbage, and has the file at `path` open as `opened`, as its maker had."""
     shared = "shared" if "colorsys" in sys.modules else "anew"
     collects = "collects" if gc.isenabled() else "keeps"
     try:
@@ -19,5 +19,5 @@ def look(opened: int, path: str) -> str:
 
 
 def parent() -> int:
-    """The process that forked this one."""
+    """Return the id of the process that forked this one."""
     return os.getppid()

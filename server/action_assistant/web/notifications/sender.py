@@ -170,7 +170,7 @@ class Notifications:
         see, or of which that is not known."""
         try:
             seen = await self._seen_by_all(message)
-        except Exception:  # the message is sent in any case
+        except Exception:  # a failed look at rights holds no message back: it names nothing then
             log.exception("it is not known who may see the graph of %s", message.id)
             seen = False
         return message if seen else message.unnamed
