@@ -427,12 +427,12 @@ class Members:
                 return
             person = offline.person
             if offline.id not in self._owner_of:
+                until = None if person.until is None else int(person.until * 1e6)
+                provider = self._records.get(person.id)
                 state = e.MemberState(
-                    person.id, person.name, person.role, person.groups, _us_of(person.until)
+                    person.id, person.name, person.role, person.groups, until, provider
                 )
-                known = person.id in self._members
-                kind = e.CHANGED if known else e.ADDED
-                state = replace(state, provider=self._records.get(person.id))
+                kind = e.CHANGED if person.id in self._members else e.ADDED
                 made = e.LinkMade(offline.id, person.id, int(offline.expires * 1e6))
                 drafts = [h.draft(kind, h.SERVER, state), h.draft(e.LINKED, h.SERVER, made)]
                 await self._append(drafts)
@@ -684,10 +684,6 @@ def _later(until: datetime | None) -> datetime | None:
 
 def _us(at: datetime | None) -> int | None:
     return None if at is None else int(at.timestamp() * 1e6)
-
-
-def _us_of(seconds: float | None) -> int | None:
-    return None if seconds is None else int(seconds * 1e6)
 
 
 def _time(us: int | None) -> datetime | None:
