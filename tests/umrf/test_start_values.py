@@ -100,6 +100,7 @@ def test_marks_of_another_form_are_kept_as_they_are(marks: object) -> None:
     [
         ({"Go_0": {"torque": 61.0}}, "at most"),
         ({"Go_0": {"torque": -0.5}}, "at least"),
+        ({"Go_0": {"torque": float("nan")}}, "a finite number"),
         ({"Go_0": {"torque": "5"}}, "is a number"),
         ({"Go_0": {"torque": True}}, "is a number"),
         ({"Go_0": {"mode": "slow"}}, "is one of"),

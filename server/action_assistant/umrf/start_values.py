@@ -5,6 +5,7 @@ in the `gui_attributes` of its action, which no engine reads and no digest cover
 """
 
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from typing import Annotated, Any, Final, TypeAlias
 
 import msgspec
@@ -70,7 +71,8 @@ class _Bounds(msgspec.Struct, frozen=True):
 
 def asked_inputs(graph: Graph) -> tuple[AskedInput, ...]:
     """Return the inputs for which a start of this graph asks, in the order of the file."""
-    return tuple(found for action in graph.actions for found in _asked(graph, action))
+    arrows = _Arrows(graph)
+    return tuple(found for action in graph.actions for found in _asked(arrows, action))
 
 
 def with_values(graph: Graph, values: Mapping[str, Mapping[str, Any]]) -> Graph:
@@ -112,6 +114,8 @@ def why_wrong(asked: AskedInput, value: Any) -> str:
     for each in members:
         if isinstance(each, bool | str):
             continue
+        if isinstance(each, float) and not isfinite(each):
+            return "is a finite number."
         if asked.least is not None and each < asked.least:
             return f"is {asked.least:g} at least."
         if asked.most is not None and each > asked.most:
@@ -119,16 +123,45 @@ def why_wrong(asked: AskedInput, value: Any) -> str:
     return ""
 
 
-def _asked(graph: Graph, action: Action) -> Iterator[AskedInput]:
+class _Arrows:
+    """The arrows of a graph by the actions to which they lead, and what they bring."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._parents = {each.key: each for each in graph.actions}
+        self._into: dict[Key, list[Relation]] = {}
+        for each in graph.relations:
+            self._into.setdefault(each.child, []).append(each)
+
+    def into(self, action: Action) -> list[Relation]:
+        """Return the arrows that lead to an action."""
+        return self._into.get(action.key, [])
+
+    def brought(self, action: Action, inputs: Mapping[str, Slot]) -> list[frozenset[str]]:
+        """Return which inputs of an action get a value, for each arrow from another action."""
+        return [self._brought(each, inputs) for each in self.into(action) if each.parent != ENTRY]
+
+    def _brought(self, arrow: Relation, inputs: Mapping[str, Slot]) -> frozenset[str]:
+        parent = self._parents.get(arrow.parent)
+        if parent is None:
+            return frozenset()
+        outputs, open_ = slots_of(parent.outputs), {n: s for n, s in inputs.items() if s.updatable}
+        try:
+            places = renamed(outputs, arrow.remap, open_)
+        except RemapUnknown:
+            return frozenset()
+        return frozenset(n for n, place in places.items() if outputs[place].type == open_[n].type)
+
+
+def _asked(arrows: _Arrows, action: Action) -> Iterator[AskedInput]:
     if action.missing or action.twin:
         return
     marks = dict(action.asks)
     inputs = slots_of(action.inputs)
     if not any(each.required and not each.has_value() for each in inputs.values()) and not marks:
         return
-    incoming = [each for each in graph.relations if each.child == action.key]
+    incoming = arrows.into(action)
     is_entry = any(each.parent == ENTRY for each in incoming)
-    brought = [_brought(graph, each, inputs) for each in incoming if each.parent != ENTRY]
+    brought = arrows.brought(action, inputs)
     seen = set[str]()
     for parameter in action.inputs:
         name, leaf = flat_name(parameter.path), parse_small(parameter.text)
@@ -141,19 +174,6 @@ def _asked(graph: Graph, action: Action) -> Iterator[AskedInput]:
         always = bool(brought) and not is_entry and all(name in each for each in brought)
         if (is_open and incoming) or (parameter.path in marks and not always):
             yield _asked_input(action, slot, leaf, marks.get(parameter.path), is_open=is_open)
-
-
-def _brought(graph: Graph, arrow: Relation, inputs: Mapping[str, Slot]) -> frozenset[str]:
-    """Return the inputs that an arrow brings a value for."""
-    parent = next((each for each in graph.actions if each.key == arrow.parent), None)
-    if parent is None:
-        return frozenset()
-    outputs, open_ = slots_of(parent.outputs), {n: s for n, s in inputs.items() if s.updatable}
-    try:
-        places = renamed(outputs, arrow.remap, open_)
-    except RemapUnknown:
-        return frozenset()
-    return frozenset(n for n, place in places.items() if outputs[place].type == open_[n].type)
 
 
 def _asked_input(
@@ -196,8 +216,7 @@ def _not_asked(graph: Graph, action: Action, name: str) -> str:
     inputs = slots_of(action.inputs)
     if name not in inputs:
         return f"{action.full_name} has no input {name}."
-    incoming = (each for each in graph.relations if each.child == action.key)
-    if any(name in _brought(graph, each, inputs) for each in incoming if each.parent != ENTRY):
+    if any(name in each for each in _Arrows(graph).brought(action, inputs)):
         return f"An arrow brings {name} of {action.full_name}: no start can set it."
     return (
         f"The graph does not ask for {name} of {action.full_name}: it has a value there, and its author "
