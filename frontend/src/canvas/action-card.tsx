@@ -16,6 +16,7 @@ import { isolated } from "../words/isolated";
 import style from "./action-card.module.css";
 import { CardLines } from "./card-lines";
 import {
+  BreakpointSpot,
   InsideSpot,
   SinceSpot,
   useDataRole,
@@ -26,7 +27,6 @@ import {
 } from "./editor-store";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
-import { BreakpointMark } from "./marks/breakpoint-mark";
 import { ChangeTag, useChangeMark } from "./marks/change-marks";
 import { ProblemBadge } from "./marks/problem-marks";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
@@ -156,7 +156,7 @@ export const ActionCard = memo(function ActionCard({
         role="img"
         aria-label={`Input of ${isolated(action.name)} ${action.instanceId}`}
       />
-      <BreakpointMark of={action.key} on="card" />
+      <BreakpointSpot of={action.key} on="card" />
       {robot !== "" && <RobotTag name={robot} />}
       {change && <ChangeTag mark={change} beside={robot !== ""} />}
       {never && <span className={style.never}>never run</span>}

@@ -14,6 +14,7 @@ import type { RunOnCanvas } from "../status/progress-inside";
 import { useWatched, Watched } from "../ui/watched";
 import type { Arrow, CanvasNode, Folding } from "./elements";
 import type { Positions, Size, Sizes } from "./geometry/arrange";
+import { BreakpointMark } from "./marks/breakpoint-mark";
 
 export interface InsideSignProps {
   readonly of: Key;
@@ -267,9 +268,10 @@ export function useOpenThreadCount(key: Key): number {
   return useWatched(useEditorStore().openThreads, (threads) => threads.get(key) ?? 0);
 }
 
-/** Return what the breakpoint of an action or arrow does, in words; undefined if it has none. */
-export function useBreakpointWords(of: string): string | undefined {
-  return useWatched(useEditorStore().breakpoints, (now) => now.get(of));
+/** Draws the mark of the breakpoint of an action or arrow, if it has one. */
+export function BreakpointSpot({ of, on }: { of: string; on: "card" | "arrow" }) {
+  const words = useWatched(useEditorStore().breakpoints, (now) => now.get(of));
+  return words !== undefined && <BreakpointMark {...{ of, on, words }} />;
 }
 
 const NONE: readonly Precondition[] = [];

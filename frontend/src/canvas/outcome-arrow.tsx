@@ -11,9 +11,8 @@ import { behindPill, pathOf } from "./arrows/line-path";
 import { LineEditingContext, useIsOpen, useLine } from "./arrows/line-store";
 import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
-import { SinceSpot, useUntakenOutcomes } from "./editor-store";
+import { BreakpointSpot, SinceSpot, useUntakenOutcomes } from "./editor-store";
 import type { Arrow } from "./elements";
-import { BreakpointMark } from "./marks/breakpoint-mark";
 import { ChangeSign, useChangeMark } from "./marks/change-marks";
 import { HandMark } from "./marks/hand-mark";
 import { ProblemBadge } from "./marks/problem-marks";
@@ -170,7 +169,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
         >
           {change && <ChangeSign mark={change} />}
           <SinceSpot of={data.relation} on="arrow" />
-          {(data.answers ?? data.entry) && <BreakpointMark of={data.relation} on="arrow" />}
+          {(data.answers ?? data.entry) && <BreakpointSpot of={data.relation} on="arrow" />}
           {data.mark && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys

@@ -1,11 +1,16 @@
 /** The mark of a breakpoint, on a card or an arrow: a disc, with a dot in it where it has conditions. */
-import { useBreakpointWords } from "../editor-store";
 import style from "./breakpoint-mark.module.css";
 
+interface BreakpointMarkProps {
+  /** The action or relation that has it. */
+  of: string;
+  on: "card" | "arrow";
+  /** What it does. */
+  words: string;
+}
+
 /** Shows where a led run waits; what it depends on is its tooltip. */
-export function BreakpointMark({ of, on }: { of: string; on: "card" | "arrow" }) {
-  const words = useBreakpointWords(of);
-  if (words === undefined) return null;
+export function BreakpointMark({ of, on, words }: BreakpointMarkProps) {
   return (
     <span
       className={style.mark}
