@@ -53,6 +53,8 @@ export type RelationSide = "parents" | "children";
 export const actionKey = (aid: Key, field: string): string => `${aid}|${field}`;
 export const parameterKey = (aid: Key, side: ParameterSide, path: string): string =>
   `${aid}|${side}/${path}`;
+/** The mark by which a start asks for an input. */
+export const askKey = (aid: Key, path: string): string => `${aid}|ask/${path}`;
 export const extraKey = (aid: Key, field: string): string => `${aid}|x/${field}`;
 export const noteKey = (id: string): string => `g/${id}`;
 /** The waypoints of a line, by the id of its bundle: `<relation>|<response>`. */

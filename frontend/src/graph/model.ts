@@ -71,6 +71,8 @@ export interface Action {
   readonly extra: Extra;
   /** Where a led run waits, as JSON text; absent: nowhere. No file has it. */
   readonly breakpoint?: JsonText;
+  /** The inputs, by path, that its author marks to be asked for at a start, each with its bounds; absent: none. */
+  readonly asks?: Extra;
 }
 
 /** An output of the parent that reaches the child under another name. */

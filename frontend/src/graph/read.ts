@@ -273,6 +273,7 @@ function readAction(key: Key, fields: OwnerFields, position: unknown): RawAction
     twin: fields.get("twin") === true,
     extra: extraOf(fields, "x"),
     ...breakpointOf(fields),
+    ...asksOf(fields),
   };
   return { action, order: asNumber(fields.get("order")) ?? 0 };
 }
@@ -329,6 +330,11 @@ function readRelation(id: string, fields: OwnerFields, positions: OwnerFields): 
 function breakpointOf(fields: OwnerFields): Pick<Action, "breakpoint"> {
   const text = asJsonText(fields.get("breakpoint"));
   return text === undefined ? {} : { breakpoint: text };
+}
+
+function asksOf(fields: OwnerFields): Pick<Action, "asks"> {
+  const asks = under(fields, "ask/");
+  return asks.length === 0 ? {} : { asks };
 }
 
 const NONE: Relation["waypoints"] = [];

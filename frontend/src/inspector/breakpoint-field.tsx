@@ -59,9 +59,12 @@ function BreakpointField({ of, text, why, ends, action, on }: FieldProps) {
       : "A led run waits before this action begins, or after its end.");
   return (
     <section className={formStyle.section} aria-label="Breakpoint">
+      <div className={formStyle.heading}>
+        <h2>Breakpoint</h2>
+      </div>
       <SharedField of={of} field="breakpoint">
         <Switch
-          label="Breakpoint"
+          label="Wait here"
           description={description}
           checked={own !== null}
           disabled={own === null && why !== null}

@@ -3,6 +3,7 @@
 import type * as Y from "yjs";
 import {
   actionKey,
+  askKey,
   extraKey,
   flatName,
   type ParameterSide,
@@ -12,6 +13,7 @@ import {
   rootOf,
 } from "../document-keys";
 import type { JsonText, Key, Parameter } from "../model";
+import type { Bounds } from "../parameters/asked-inputs";
 import { remapFor, type Tie } from "../parameters/output-choices";
 import { asJsonText } from "../values";
 import { asOneEdit, eraseKeys, graphNow, hasAction, writeKey } from "./document-writes";
@@ -64,6 +66,7 @@ export function removeParameter(doc: Y.Doc, key: Key, side: ParameterSide, path:
   asOneEdit(doc, () => {
     const paths = pathsOf(doc, key, side).filter((other) => other !== path);
     eraseKeys(doc, "actions", parameterKey(key, side, path));
+    if (side === "in") eraseKeys(doc, "actions", askKey(key, path));
     writePaths(doc, key, side, paths);
   });
   return true;
@@ -83,7 +86,22 @@ export function renameParameter(
     const text = rootOf(doc, "actions").get(parameterKey(key, side, path));
     writeKey(doc, "actions", parameterKey(key, side, to), text);
     eraseKeys(doc, "actions", parameterKey(key, side, path));
+    const mark = rootOf(doc, "actions").get(askKey(key, path));
+    if (side === "in" && mark !== undefined) {
+      writeKey(doc, "actions", askKey(key, to), mark);
+      eraseKeys(doc, "actions", askKey(key, path));
+    }
     writePaths(doc, key, side, paths);
+  });
+  return true;
+}
+
+/** Sets whether, and within which bounds, a start asks for an input. False when that is gone. */
+export function setAsk(doc: Y.Doc, key: Key, path: string, bounds: Bounds | null): boolean {
+  if (!exists(doc, key, "in", path)) return false;
+  asOneEdit(doc, () => {
+    if (bounds === null) eraseKeys(doc, "actions", askKey(key, path));
+    else writeKey(doc, "actions", askKey(key, path), JSON.stringify(bounds));
   });
   return true;
 }

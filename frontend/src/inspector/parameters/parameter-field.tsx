@@ -1,12 +1,13 @@
 /** One parameter: what it is called, its value or what gives it, and what else it is. */
 import { ActionIcon, Button, Group, Switch } from "@mantine/core";
-import { IconAdjustments, IconLock, IconTrash } from "@tabler/icons-react";
+import { IconAdjustments, IconLock, IconMessageQuestion, IconTrash } from "@tabler/icons-react";
 import { type ReactNode, use, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import { pathWords } from "../../graph/field-words";
-import type { Action, Key, Parameter } from "../../graph/model";
+import type { Action, Parameter } from "../../graph/model";
+import { askOf } from "../../graph/parameters/asked-inputs";
 import { type InputGiver, readValue, takenGivers } from "../../graph/parameters/data-flow";
 import { pathFrom, taken } from "../../graph/parameters/names";
 import { outputChoices } from "../../graph/parameters/output-choices";
@@ -25,6 +26,7 @@ import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/view-only";
 import style from "../inspector.module.css";
+import { AskSetting } from "./ask-setting";
 import { DataFlowContext, GiverChips, useDataLights } from "./data-flow";
 import flowStyle from "./data-flow.module.css";
 import { OutputPicker } from "./output-picker";
@@ -43,11 +45,13 @@ interface LabelProps {
   /** The name with its groups. */
   fullName: string;
   field: ParameterValue;
+  /** Its author has marked it. */
+  asked: boolean;
   open: boolean;
   onOpen: () => void;
 }
 
-function Label({ name, fullName, field, open, onOpen }: LabelProps) {
+function Label({ name, fullName, field, asked, open, onOpen }: LabelProps) {
   return (
     <span className={style.label}>
       <span className={style.path} title={fullName}>
@@ -57,6 +61,11 @@ function Label({ name, fullName, field, open, onOpen }: LabelProps) {
         {field.type ?? "no type"}
         {!field.required && " · optional"}
       </span>
+      {asked && (
+        <Tooltip label="Asked at the start">
+          <IconMessageQuestion size={13} aria-label="asked at the start" />
+        </Tooltip>
+      )}
       {field.locked && (
         <Tooltip label="Locked: outputs of other actions never replace this value">
           <IconLock size={12} aria-label="locked" />
@@ -179,6 +188,7 @@ export function ParameterField({ action, side, parameter, name }: Props) {
             name={name}
             fullName={pathWords(parameter.path)}
             field={field}
+            asked={side === "in" && askOf(action, parameter.path) !== null}
             open={open}
             onOpen={() => setOpen(!open)}
           />
@@ -186,7 +196,7 @@ export function ParameterField({ action, side, parameter, name }: Props) {
       />
       {open && (
         <ParameterSettings
-          owner={action.key}
+          action={action}
           side={side}
           parameter={parameter}
           others={list.filter((other) => other !== parameter)}
@@ -198,15 +208,16 @@ export function ParameterField({ action, side, parameter, name }: Props) {
 }
 
 interface SettingsProps {
-  owner: Key;
+  action: Action;
   side: ParameterSide;
   parameter: Parameter;
   others: readonly Parameter[];
   onClose: () => void;
 }
 
-function ParameterSettings({ owner, side, parameter, others, onClose }: SettingsProps) {
+function ParameterSettings({ action, side, parameter, others, onClose }: SettingsProps) {
   const { doc } = useEditorContext();
+  const owner = action.key;
   const field = parameterValueOf(parameter.text);
   const name = pathWords(parameter.path);
   const write = (change: (now: string) => string) =>
@@ -264,6 +275,7 @@ function ParameterSettings({ owner, side, parameter, others, onClose }: Settings
           }}
         />
       )}
+      {side === "in" && <AskSetting action={action} parameter={parameter} />}
       <Group gap="xs">
         <Button size="compact-sm" disabled={false} onClick={onClose}>
           Close
