@@ -7,6 +7,7 @@ from litestar import Request
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.folders import Folders
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
+from action_assistant.editor.catalogue.graph_pages import GraphPages
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.graph_rights import GraphRights
 from action_assistant.editor.catalogue.versions import Versions
@@ -82,6 +83,9 @@ class EditorServices:
             self.graph_checks,
             workers.files,
             self.rights.made,
+        )
+        self.graph_pages = GraphPages(
+            journal, self.rooms, self.graph_checks, self.rights, self.catalogue
         )
         self.folders = Folders(journal, self.rights)
         self.versions = Versions(

@@ -139,14 +139,35 @@ key_change_head: Final = Table(
     Column("document", LargeBinary, nullable=False),
     Column("form", BigInteger),
 )
-#: What lists show of each graph, as MessagePack (`Facts`). `form`: a digest of the code that computed it.
-#: Computed again from the document whenever it is not there.
+#: What lists show of each graph, as MessagePack (`Facts`), and by what they are sorted and searched. `form`: a
+#: digest of the code that computed it. `seq`: the change, at `changed_at`, up to which the row is known to be right
+#: if `form` is that of this program. `name_key`: `name` in the order of people. `words`: all texts that are searched, in
+#: lower case. `worst`: the counts of problems as one number, `worst_alone` without the graphs inside. Computed again
+#: from the document whenever it is not there.
 graph_facts: Final = Table(
     "graph_facts",
     EDITOR,
     Column("graph", Text, primary_key=True),
     Column("form", LargeBinary, nullable=False),
     Column("facts", LargeBinary, nullable=False),
+    Column("seq", BigInteger, nullable=False, server_default="0"),
+    Column("changed_at", BigInteger, nullable=False, server_default="0"),
+    Column("name", Text, nullable=False, server_default=""),
+    Column("name_key", LargeBinary),
+    Column("words", Text, nullable=False, server_default=""),
+    Column("actions", BigInteger, nullable=False, server_default="0"),
+    Column("worst", BigInteger, nullable=False, server_default="0"),
+    Column("worst_alone", BigInteger, nullable=False, server_default="0"),
+    Index(None, "changed_at"),
+    Index(None, "name_key"),
+)
+#: The labels of each graph. Written together with its facts.
+graph_label: Final = Table(
+    "graph_label",
+    EDITOR,
+    Column("label", Text, primary_key=True),
+    Column("graph", Text, primary_key=True),
+    Index(None, "graph"),
 )
 #: A person for whom an owner has made a personal link, or who came by a provider. `groups`: ids of groups,
 #: as JSON. `until`: when the right to do more than Stop ends. `provider`: as whom the provider knows them,

@@ -827,6 +827,14 @@ export interface EditorApi {
         seq: number;
     };
     /**
+     * GraphName
+     * @description The id and the name of a graph.
+     */
+    GraphName: {
+        id: string;
+        name: string;
+    };
+    /**
      * GraphResultEvent
      * @description The exit of a graph was reached with this result.
      */
@@ -1111,6 +1119,14 @@ export interface EditorApi {
         before?: unknown;
         /** @description Any JSON value */
         after?: unknown;
+    };
+    /**
+     * LabelCount
+     * @description A label, and how many graphs have it.
+     */
+    LabelCount: {
+        label: string;
+        graphs: number;
     };
     /**
      * LaneState
@@ -2642,6 +2658,12 @@ export interface EditorPaths {
         get: EditorOperations["listGraphs"];
         post: EditorOperations["createGraph"];
     };
+    "/api/graphs/names": {
+        get: EditorOperations["listGraphNames"];
+    };
+    "/api/graphs/labels": {
+        get: EditorOperations["listGraphLabels"];
+    };
     "/api/graphs/{graph_id}": {
         get: EditorOperations["getGraph"];
         delete: EditorOperations["deleteGraph"];
@@ -3318,6 +3340,14 @@ interface EditorOperations {
         parameters: {
             query?: {
                 deleted?: boolean;
+                limit?: number | null;
+                offset?: number;
+                sort?: "changed" | "name" | "problems" | "size";
+                q?: string;
+                folder?: string | null;
+                deep?: boolean;
+                label?: string | null;
+                first?: string[] | null;
             };
         };
         responses: {
@@ -3352,6 +3382,30 @@ interface EditorOperations {
             201: {
                 content: {
                     "application/json": EditorApi["MadeGraph"];
+                };
+            };
+        };
+    };
+    listGraphNames: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphName"][];
+                };
+            };
+        };
+    };
+    listGraphLabels: {
+        parameters: {
+            query?: {
+                folder?: string | null;
+                deep?: boolean;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LabelCount"][];
                 };
             };
         };

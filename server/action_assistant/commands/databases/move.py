@@ -42,7 +42,11 @@ from action_assistant.schema.branches import BRANCHES
 
 #: Tables that are not compared: the writers, and tables that are computed again from events.
 _APART: Final = frozenset(
-    {"written_by", "key_change", "overwritten_value", "key_change_head", "graph_facts"}
+    {
+        "written_by",
+        *("key_change", "overwritten_value", "key_change_head"),
+        *("graph_facts", "graph_label"),
+    }
 )
 _ROWS: Final = 500  # in memory
 _WIDE: Final = 1 << 256

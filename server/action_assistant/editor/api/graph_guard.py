@@ -29,6 +29,8 @@ PARAMETERS: Final[dict[str, Kind]] = {
 FILTERED: Final = frozenset(
     {
         "/api/graphs",
+        "/api/graphs/names",
+        "/api/graphs/labels",
         "/api/folders",
         "/api/events",
         "/api/actions",

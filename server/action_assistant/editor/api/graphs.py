@@ -1,13 +1,15 @@
 """Routes of graphs: the list, the content of one now or earlier, and its problems."""
 
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, TypeAlias
 
 import msgspec
 from litestar import Request, Response, delete, get, patch, post, put
-from litestar.params import Parameter
+from litestar.params import Parameter, QueryParameter
 from litestar.types import ControllerRouterHandler
 
+from action_assistant.editor.catalogue import graph_pages
 from action_assistant.editor.catalogue.catalogue import GraphView
+from action_assistant.editor.catalogue.graph_pages import GraphName, LabelCount, Wanted
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange import importing
@@ -16,7 +18,7 @@ from action_assistant.editor.interchange.importing import ImportReport, Preview
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.errors import Conflict
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
@@ -28,6 +30,10 @@ from action_assistant.web.server.openapi import MOST_NUMBER, answer, reads
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1, le=MOST_NUMBER)]
 SeqOrNone = Annotated[int | None, Parameter(ge=1, le=MOST_NUMBER)]
+Limit: TypeAlias = Annotated[int | None, Parameter(ge=1, le=graph_pages.MOST)]
+Offset: TypeAlias = Annotated[int, Parameter(ge=0, le=MOST_NUMBER)]
+Search: TypeAlias = Annotated[str, Parameter(max_length=200)]
+First: TypeAlias = Annotated[list[str] | None, QueryParameter(max_items=graph_pages.MOST_FIRST)]
 
 _TOLD: Final = 50  # keys of a conflict that an answer lists
 
@@ -63,7 +69,7 @@ class Problems(msgspec.Struct, frozen=True):
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/graphs`, except for versions, rooms and history."""
-    return [*_catalogue(app_state), *_contents(app_state)]
+    return [*_lists(app_state), *_catalogue(app_state), *_contents(app_state)]
 
 
 def made_graph(made: GraphView, told: bytes | None) -> Response[MadeGraph]:
@@ -100,26 +106,79 @@ async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) 
     return await services.graph_checks.inside(then, more=uses, partly=True)
 
 
-def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
+def _lists(app_state: EditorState) -> list[ControllerRouterHandler]:
     @get(
         "/api/graphs",
-        summary="All graphs, the last changed first",
+        summary="All graphs, the last changed first; with `limit` a page of those that are searched by "
+        "`q`, `folder` (empty: in none; `deep`: and in folders inside), and `label`, and their number "
+        "in X-Total. `first`: ids of graphs that come before the others",
         operation_id="listGraphs",
         guards=[Needs("see")],
     )
-    async def list_graphs(request: Asking, deleted: bool = False) -> list[GraphView]:
+    async def list_graphs(
+        request: Asking,
+        deleted: bool = False,
+        limit: Limit = None,
+        offset: Offset = 0,
+        sort: graph_pages.Order = "changed",
+        q: Search = "",
+        folder: str | None = None,
+        deep: bool = False,
+        label: str | None = None,
+        first: First = None,
+    ) -> Response[list[GraphView]]:
         services, identity = app_state.services, identity_of(request)
-        sees, is_restricted = (
-            await services.rights.sight(identity),
-            await services.rights.restrictions(),
+        wanted = Wanted(q, folder, deep, label)
+        if limit is None:
+            if wanted != Wanted() or offset or first or sort != "changed":
+                raise BadInput("A part of the list needs a `limit`.", where={"path": "/limit"})
+            return Response(await _whole_list(services, identity, deleted=deleted))
+        if deleted:
+            raise BadInput("Deleted graphs are listed all at once.", where={"path": "/limit"})
+        page = await services.graph_pages.page(
+            identity, wanted, limit=limit, offset=offset, order=sort, first=first or ()
         )
-        listed = await services.catalogue.all(deleted=deleted)
-        return [
-            _in_sight(services, view, identity, restricted=is_restricted(view.id))
-            for view in listed
-            if sees(view.id)
-        ]
+        return Response(list(page.graphs), headers={"x-total": str(page.total)})
 
+    @get(
+        "/api/graphs/names",
+        summary="The names of all graphs, sorted by name",
+        operation_id="listGraphNames",
+        guards=[Needs("see")],
+    )
+    async def list_names(request: Asking) -> tuple[GraphName, ...]:
+        return await app_state.services.graph_pages.names(identity_of(request))
+
+    @get(
+        "/api/graphs/labels",
+        summary="The labels of all graphs, or of those in a `folder` (empty: in none; `deep`: and in "
+        "folders inside), with the number of graphs that have each",
+        operation_id="listGraphLabels",
+        guards=[Needs("see")],
+    )
+    async def list_labels(
+        request: Asking, folder: str | None = None, deep: bool = False
+    ) -> tuple[LabelCount, ...]:
+        wanted = Wanted(folder=folder, deep=deep)
+        return await app_state.services.graph_pages.labels(identity_of(request), wanted)
+
+    return [list_graphs, list_names, list_labels]
+
+
+async def _whole_list(
+    services: EditorServices, identity: Identity, *, deleted: bool
+) -> list[GraphView]:
+    sees = await services.rights.sight(identity)
+    is_restricted = await services.rights.restrictions()
+    listed = await services.catalogue.all(deleted=deleted)
+    return [
+        _in_sight(services, view, identity, restricted=is_restricted(view.id))
+        for view in listed
+        if sees(view.id)
+    ]
+
+
+def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
     @post(
         "/api/graphs",
         summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}, in a "
@@ -200,7 +259,7 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         services, person = await app_state.acting(request)
         return await services.catalogue.recover(graph_id, person.id)
 
-    return [list_graphs, create_graph, get_graph, describe_graph, delete_graph, recover_graph]
+    return [create_graph, get_graph, describe_graph, delete_graph, recover_graph]
 
 
 def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:

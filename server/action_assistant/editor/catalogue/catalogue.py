@@ -154,6 +154,20 @@ class Catalogue:
         self._checks.compute_later(later)
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
+    async def some(self, graphs: Sequence[str], *, exact: bool = True) -> list[GraphView]:
+        """Return the graphs with these ids as lists show them, in their order, without those that
+        are gone. There must be few, since facts about them that are not known are computed first.
+        Without `exact` no document is read, and problems are those that were counted last; what is
+        not known is computed for a later call."""
+        rows = {row.id: row for row in await self._journal.query(_some(graphs))}
+        await self._checks.facts.recall(rows)
+        found = [rows[graph] for graph in graphs if graph in rows]
+        if exact:
+            return [await self._view(row) for row in found]
+        later = {row.id: row.seq for row in found if not self._checks.is_known(row.id, row.seq)}
+        self._checks.compute_later(later)
+        return [self._shown(row, self._checks.last_summary(row.id, row.seq)) for row in found]
+
     async def create(
         self,
         body: bytes,
@@ -420,6 +434,10 @@ def _rows() -> Select[Any]:
         at.scalar_subquery().label("at"),
         drafts.scalar_subquery().label("drafts"),
     )
+
+
+def _some(graphs: Sequence[str]) -> Select[Any]:
+    return _rows().where(editor_tables.graph.c.id.in_(graphs))
 
 
 _ID: Final = editor_tables.graph.c.id == bindparam("id")

@@ -265,6 +265,17 @@ class GraphChecks:
             return GraphSummary(newest)
         return _summary(known, newest, None, None)
 
+    def last_summary(self, graph: str, newest: int) -> GraphSummary:
+        """Return what is in memory for lists about a graph, with the problems that were counted last;
+        the graphs inside may have changed since."""
+        known = self.facts.get(graph)
+        if known is None or known.newest < newest:
+            return GraphSummary(newest)
+        if not known.is_current:
+            return _summary(known, newest, None, None)
+        counted = known.info if known.inside is None else known.inside
+        return _summary(known, newest, counted.problems, counted.told)
+
     async def _counted(self, graph: str, about: Facts, named: NamedInside) -> CountsInside:
         key = named.key()
         if about.inside is None or about.inside.key != key:

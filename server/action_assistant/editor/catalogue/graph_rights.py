@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
-from sqlalchemy import Row, bindparam, select
+from sqlalchemy import ColumnElement, Row, and_, bindparam, false, or_, select
 
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
@@ -288,6 +288,11 @@ class GraphRights:
 
         return sees
 
+    def restricts(self, rule: str | None, folder: str | None) -> bool:
+        """Return whether not everybody may see or edit a graph in a folder, with a `rule` as it is
+        stored."""
+        return self._is_ruled and self.rule_in(folder, _rule(rule)) != OPEN
+
     async def is_restricted(self, graph: str) -> bool:
         """Return whether not everybody may see or edit a graph."""
         return await self._counting(graph) != OPEN
@@ -300,6 +305,29 @@ class GraphRights:
         return frozenset(
             row.id for row in rows if self._of_row(row, by_id).counts != OPEN
         ).__contains__
+
+    async def is_visible(self, identity: Identity) -> ColumnElement[bool] | None:
+        """Return a condition for queries of the table of graphs, by which an identity may see a graph
+        that is no draft; None if it sees every graph."""
+        await self._require_current()
+        if not self._is_ruled or identity.person.role == OWNER:
+            return None
+        ruled = select(_GRAPH.c.rule).where(_GRAPH.c.rule.is_not(None)).distinct()
+        rules = [row.rule for row in await self._journal.query(ruled)]
+        seen = [text for text in rules if may_see(msgspec.json.decode(text, type=Rule), identity)]
+        folders = self.folders_seen(identity)  # not those out of sight: new ones may have come
+        by_folder = or_(_GRAPH.c.folder.is_(None), _GRAPH.c.folder.in_(folders))
+        by_rule = _GRAPH.c.rule.in_(seen) if seen else false()
+        return or_(and_(_GRAPH.c.rule.is_(None), by_folder), by_rule)
+
+    def folders_seen(self, identity: Identity) -> dict[str, str | None]:
+        """Return the folder around each folder that an identity may see, by id. A folder in one that
+        it may not see is shown as in none."""
+        shown = {each for each in self._folders if self.sees_folder(each, identity)}
+        return {
+            each: parent if (parent := self._folders[each].parent) in shown else None
+            for each in shown
+        }
 
     def sees_folder(self, folder: str | None, identity: Identity) -> bool:
         """Return whether an identity may see a folder; None: no folder. While a stored change does not

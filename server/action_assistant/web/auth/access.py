@@ -522,7 +522,7 @@ class Access:
                 (b"access-control-allow-credentials", b"true"),
                 (b"access-control-allow-methods", b"GET, POST, PATCH, PUT, DELETE"),
                 (b"access-control-allow-headers", b"authorization, content-type, last-event-id"),
-                (b"access-control-expose-headers", b"location, x-request-id"),
+                (b"access-control-expose-headers", b"location, x-request-id, x-total"),
                 (b"access-control-max-age", b"600"),
                 (b"vary", b"origin"),
             ]
