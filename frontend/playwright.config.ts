@@ -53,6 +53,8 @@ export default defineConfig({
     trace: process.env.CI ? "on-first-retry" : "retain-on-failure",
     screenshot: "only-on-failure",
     actionTimeout: 15_000,
+    // What moves is drawn by the processor here, sixty times a second. `make soak` looks at it in motion.
+    contextOptions: { reducedMotion: process.env.TEST_LONG ? "no-preference" : "reduce" },
     // It would keep the page anew for each of them; offline.spec.ts is about it.
     serviceWorkers: "block",
     launchOptions,
