@@ -338,6 +338,7 @@ async def prepared(served: Served, actions: int) -> Named:
     )  # fmt: skip
 
 
+@pytest.mark.long
 async def test_no_route_works_on_the_loop_as_long_as_its_graph_is_large(served: Served) -> None:
     await served.bring(3, "Act5")
     small, large = [await prepared(served, actions) for actions in (SMALL, LARGE)]

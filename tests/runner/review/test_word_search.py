@@ -77,7 +77,7 @@ def asked(connection: Connection, wanted: str) -> tuple[list[Any], list[Any], bo
     return by_index, by_reading, among is not None
 
 
-@settings(max_examples=examples(200), deadline=None)
+@settings(max_examples=examples(80), deadline=None)
 @given(st.lists(st.tuples(texts, texts, texts, texts, texts), max_size=5), texts, st.integers(0, 3))
 def test_every_text_is_found_where_it_is(
     told: list[tuple[str, ...]], wanted: str, late: int

@@ -30,12 +30,14 @@ def test_each_action_has_the_files_that_it_would_have_alone() -> None:
     assert bundle_files("kitchen", (DRIVE, LOOK)) == files
 
 
+@pytest.mark.long
 def test_the_sources_of_all_compile_side_by_side_and_are_laid_out(tmp_path: Path) -> None:
     package = laid_out(bundle_files("kitchen", (DRIVE, LOOK)), tmp_path)
     assert compile_errors(package) == ""
     assert layout_faults([str(path) for path in package.rglob("*.[ch]pp")]) == ""
 
 
+@pytest.mark.long
 def test_cmake_builds_and_installs_all_libraries_and_descriptions(tmp_path: Path) -> None:
     """The build has stubs for ROS 2 and the engine, which CI does not have."""
     if shutil.which("g++") is None:

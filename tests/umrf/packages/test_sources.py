@@ -107,6 +107,7 @@ def test_cmake_sees_no_variable_in_a_description() -> None:
     assert r'"a \${HOME} \$ENV{HOME} \@X\@ \"b\" \\ c"' in line
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "fields",
     [
