@@ -11,6 +11,7 @@ const run = (part: object = {}) =>
 
 test("a run that is led and goes on can wait", () => {
   expect(canWait(run())).toBe(true);
+  expect(canWait(run({ simulated: true, robots: { "": "simulator" } }))).toBe(true);
 });
 
 test("a run that waits, is stopped, is over, or was handed over whole cannot", () => {
@@ -18,7 +19,6 @@ test("a run that waits, is stopped, is over, or was handed over whole cannot", (
     { held: { by: null, why: "", since: "2026-01-01" } },
     { desired: "stopped" },
     { ended_at: "2026-01-01" },
-    { simulated: true },
     { robots: null },
   ];
   for (const part of parts) expect(canWait(run(part))).toBe(false);

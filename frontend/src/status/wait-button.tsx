@@ -11,7 +11,7 @@ import { letWait, type Run } from "../api/runs";
 /** True if a run can wait: it is led action by action, and goes on. */
 export function canWait(run: Run): boolean {
   const goes = run.ended_at === null && run.desired === "running" && !run.held;
-  return goes && !run.simulated && Boolean(run.robots);
+  return goes && Boolean(run.robots);
 }
 
 function failure(error: unknown, run: Run) {
@@ -22,7 +22,7 @@ function failure(error: unknown, run: Run) {
 
 export function WaitButton({ run }: { run: Run }) {
   const { live, runner, now } = useLive();
-  const may = useMay("operate");
+  const may = useMay(run.simulated ? "simulate" : "operate");
   const wait = useMutation({
     mutationFn: () => letWait(runner ?? "", run.id),
     onSuccess: (fresh) => live?.learn(fresh),

@@ -1,6 +1,7 @@
 """The search for an arrow agrees with an engine in which every end of every action is tried."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -20,6 +21,7 @@ from action_assistant.umrf.model import (
     Action,
     Conditions,
     Graph,
+    Precondition,
     Relation,
 )
 from action_assistant.umrf.semantics import Call, Engine, Returned, Trace
@@ -55,6 +57,8 @@ class EveryCall:
     def give_up(self, number: int) -> str | None:
         self.going.pop(number, None)
         return None
+
+    def ended(self, number: int, result: Precondition, outputs: Mapping[str, Any]) -> None: ...
 
 
 def played(graph: Graph, ends: tuple[tuple[int, str], ...]) -> tuple[list[Trace], list[int]]:

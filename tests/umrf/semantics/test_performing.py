@@ -1,11 +1,12 @@
 """Actions of a performer: the engine calls it, and hears the results."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts
-from action_assistant.umrf.model import Action, Parameter
+from action_assistant.umrf.model import Action, Parameter, Precondition
 from action_assistant.umrf.semantics import (
     Call,
     Engine,
@@ -47,6 +48,8 @@ class Performing:
     def give_up(self, number: int) -> str | None:
         self.told.append(("give_up", number))
         return "it was killed"
+
+    def ended(self, number: int, result: Precondition, outputs: Mapping[str, Any]) -> None: ...
 
 
 def made(

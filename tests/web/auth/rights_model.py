@@ -40,11 +40,11 @@ NEEDED: Final[tuple[tuple[str, Permission | None], ...]] = (
     (r" get ", "see"),
     (r" (post|patch|delete) /api/robots(/\{name\})?$", "register"),
     (
-        r"^runner post /api/(preflight|asked_inputs|runs|runs/\{run\}/(modify|pause|resume))$",
+        r"^runner (post|put) /api/(preflight|asked_inputs|runs|runs/\{run\}/(modify|pause|resume|go_on|step|wait|breakpoints))$",
         "simulate",
     ),
     (r"^runner \w+ /api/(approvals|groups|robots/.*)", "operate"),
-    (r" /api/runs/\{run\}/(at_rest|go_on|step|wait|hand_over|outcome|breakpoints)$", "operate"),
+    (r" /api/runs/\{run\}/(at_rest|hand_over|outcome)$", "operate"),
     # What is one's own, and what answers without changing anything.
     (r" /api/(devices|confirmations|logins|mentions/read|passkeys|tokens)\b", "see"),
     (r"/(extraction|preview|rehearsal|rewriting|since|unpacking|script|check|pieces)$", "see"),

@@ -305,8 +305,8 @@ function useWay({ graph, seq, chosen, robots }: Props) {
   const [wanted, want] = useState<boolean | null>(chosen.includes(CONDUCTED) ? true : null);
   const mayLead = now.engines.some((robot) => robot.led);
   const waits = (marks.data?.length ?? 0) > 0;
-  const led = wanted ?? (several || (waits && mayLead));
-  const offered = several || led || mayLead;
+  const led = wanted ?? (several || waits);
+  const offered = several || waits || led || mayLead;
   const cast = castOf(actors, picked, now.engines, may);
   const missing = led ? castObstacle(actors, cast) : null;
   const way = { text, marks, actors, several, led, want, offered };

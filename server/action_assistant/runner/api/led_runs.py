@@ -7,6 +7,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.refused_starts import StartNeeds, noted
+from action_assistant.runner.api.run_guard import require_command_role
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.runs import views
 from action_assistant.runner.start.admission import (
@@ -33,11 +34,12 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Let a held run go on: its robots may begin to move",
         opt=reads(GoOnRequest),
-        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
+        guards=[StartNeeds(services, "go_on", of_people=True)],
     )
     async def go_on(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), GoOnRequest)
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
+            await require_command_role(services, run, request)
             me = identity_of(request)
             return views.run_view(await services.control.go_on(run, asked, author_of(request), me))
 
@@ -47,11 +49,12 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Let one action of a held run begin, then hold it again: a robot may begin to move",
         opt=reads(StepRequest),
-        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
+        guards=[StartNeeds(services, "go_on", of_people=True)],
     )
     async def step(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), StepRequest)
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
+            await require_command_role(services, run, request)
             me = identity_of(request)
             return views.run_view(await services.control.step(run, asked, author_of(request), me))
 
@@ -61,10 +64,11 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Let a led run begin nothing further; what is under way goes on",
         opt=reads(WaitRequest | None),
-        guards=[Needs("operate")],
+        guards=[Needs("simulate")],
     )
     async def wait(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body() or b"{}", WaitRequest)
+        await require_command_role(services, run, request)
         return views.run_view(await services.control.wait(run, asked, author_of(request)))
 
     @put(
@@ -73,11 +77,12 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Set where a led run waits; taking one away is a start",
         opt=reads(BreakpointsRequest),
-        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
+        guards=[StartNeeds(services, "go_on", of_people=True)],
     )
     async def breakpoints(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), BreakpointsRequest)
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
+            await require_command_role(services, run, request)
             author, me = author_of(request), identity_of(request)
             return views.run_view(await services.control.set_breakpoints(run, asked, author, me))
 

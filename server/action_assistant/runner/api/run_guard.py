@@ -25,7 +25,7 @@ from action_assistant.runner.runs.sight import (
     RunGraphs,
     Unseen,
 )
-from action_assistant.web.auth.access import identity_of
+from action_assistant.web.auth.access import identity_of, require
 from action_assistant.web.auth.identity import ANYBODY
 
 _Connection = ASGIConnection[Any, Any, Any, Any]
@@ -97,6 +97,14 @@ def guarded(
                 raise CannotStart(f"{path} does not say how it treats runs that are hidden.")
             handler.guards = [*(handler.guards or ()), guard]
     return checked
+
+
+async def require_command_role(services: RunnerServices, run: str, connection: _Connection) -> None:
+    """Check the role of the caller for a command to the run with the id `run`: a run on a robot
+    needs more than a simulated one. Raise Forbidden if it is too low, NotFound if there is no such
+    run."""
+    if not await services.control.simulates(run):
+        require(connection, "operate")
 
 
 def unseen_by(services: RunnerServices, connection: _Connection) -> Unseen | None:

@@ -37,6 +37,7 @@ from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.run_guard import (
     guarded,
     is_hidden,
+    require_command_role,
     require_run,
     shown,
     unseen_by,
@@ -200,7 +201,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
     )
     async def pause(run: str, request: _Asking) -> views.RunShown:
-        await _require_command_role(services, run, request)
+        await require_command_role(services, run, request)
         return views.run_view(await services.control.pause(run, author_of(request)))
 
     @post(
@@ -214,7 +215,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def resume(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body() or b"{}", ResumeRequest)
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
-            await _require_command_role(services, run, request)
+            await require_command_role(services, run, request)
             author, me = author_of(request), identity_of(request)
             return views.run_view(await services.control.resume(run, author, me, asked))
 
@@ -229,7 +230,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
         with noted(services, request, StartRefused(what="change", why="", run=run[:100])):
-            await _require_command_role(services, run, request)
+            await require_command_role(services, run, request)
             async with body_of(request, services.body_limit) as body:
                 me = identity_of(request)
                 changed = await services.control.modify(run, body, author_of(request), me)
@@ -389,14 +390,6 @@ def _rules(services: RunnerServices) -> ControllerRouterHandler:
         services.audit.note(OwnerDid("rules_told"), person_of(request).id)
 
     return store
-
-
-async def _require_command_role(services: RunnerServices, run: str, request: _Asking) -> None:
-    """Check the role of the caller for a command to the run with the id `run`: a run on a robot
-    needs more than a simulated one. Raise Forbidden if it is too low, NotFound if there is no such
-    run."""
-    if not await services.control.simulates(run):
-        require(request, "operate")
 
 
 async def _stop_id(request: _Asking) -> str:

@@ -29,7 +29,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.runner.start.piece_texts import PieceText
 from action_assistant.umrf.breakpoints import Breakpoint
-from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.facts import SIMULATED, EngineFacts
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.led_subgraphs import StatesInside, outcome_of_subgraph
 from action_assistant.umrf.model import Precondition
@@ -42,6 +42,17 @@ from action_assistant.web.auth.identity import Identity
 CONDUCTED_FACTS: Final = msgspec.structs.replace(
     SIMULATED, synchronises=True, stop_timeout_ms=10**12
 )
+
+
+def leading_facts(*, is_simulated: bool) -> EngineFacts:
+    """Return the facts of the engine that plays the whole graph of a led run. `is_simulated`: no robot
+    plays any of it, so that an action that ignores its stop ends as in the simulator."""
+    if not is_simulated:
+        return CONDUCTED_FACTS
+    stop_timeout_ms = SIMULATED.stop_timeout_ms
+    return msgspec.structs.replace(CONDUCTED_FACTS, stop_timeout_ms=stop_timeout_ms)
+
+
 #: Bits of the number of a call in which the visits of an action inside of its sub-graph are counted.
 _VISIT_BITS: Final = 20
 #: Who stops an action in the name of the graph: an arrow of it, or its end.
@@ -93,7 +104,8 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     so far; `sent`: the highest number of a piece; `pieces`: by the number of each call without an
     outcome, the piece and the seq of its last event; `again`: pieces that moved again after their
     outcome, each with that seq; `calls`: all calls so far, with the full names of their actions; `breakpoints`:
-    those that count; `states`: of the actions that robots carry out; `unproven`: the last
+    those that count; `played`: the calls among them that the simulator plays; `states`: of the actions;
+    `unproven`: the last
     piece that ended without a proof of rest by an answer, None if there is none."""
 
     order: Order
@@ -104,6 +116,7 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     states: dict[str, str]
     unproven: Run | None
     calls: dict[int, str] = {}
+    played: dict[int, str] = {}
     breakpoints: tuple[Breakpoint, ...] = ()
 
 

@@ -1,9 +1,10 @@
 """Leads one run on several robots: plays the whole graph, and sends each robot one action at a time.
 
-The engine of the whole graph (`LeadableLink`) says which action begins and which one has to stop; it
+The engine of the whole graph (`LeadingEngine`) says which action begins and which one has to stop; it
 moves nothing. For each action that begins, the conductor sends a piece, a graph of that action
 alone, to the robot that plays it. A piece is a run like any other (`OpenRun`), with its own stream,
-monitor, Stop and proof. Its states tell the outcome, which goes back to the engine.
+monitor, Stop and proof. Its states tell the outcome, which goes back to the engine. Actions that no
+robot plays pass the same gate, and then the simulator plays them (`PlayedSteps`).
 
 The run sees the conductor as its link: it is started, stopped and asked like an engine. A graph that
 has ended is shown as such only when no piece is open, so that the proof of rest of the run is made of
@@ -15,7 +16,7 @@ start message leaves. A Stop closes it for good before any stop message leaves.
 
 import logging
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, ExitStack, suppress
+from contextlib import AbstractContextManager
 from math import inf
 from typing import Final, Literal, NoReturn
 
@@ -35,18 +36,18 @@ from action_assistant.runner.execution.conducted_steps import (
     StallWatch,
     Step,
     Word,
-    order_of,
     outcome_shown,
     piece_to_send,
     seen_inside,
     seen_of,
 )
+from action_assistant.runner.execution.leading_engine import LeadingEngine
 from action_assistant.runner.execution.led_gate import LedGate
 from action_assistant.runner.execution.led_look import Cleared, LedLook, NotAllowed
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.piece_values import PieceValues, returned_of
+from action_assistant.runner.execution.played_steps import PlayedSteps
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
-from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import (
     ACTIVE,
@@ -59,11 +60,11 @@ from action_assistant.runner.links.observations import (
     Snapshot,
 )
 from action_assistant.runner.links.port import (
+    SIMULATOR,
     Answer,
     CallBegan,
+    CallPlayed,
     CallStopped,
-    EngineChanged,
-    EngineRefused,
     Leaves,
     NoAnswer,
     NotSent,
@@ -87,13 +88,12 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.semantics import Returned
 from action_assistant.web.auth.identity import Identity
 
 log: Final = logging.getLogger(__name__)
 
 _STORED_S: Final = 5  # for which a piece waits for the journal; later it needs a person
-_MOST_ENGINES: Final = 3  # that are begun for one run after the first
+_STOOD_STILL_S: Final = 0.1
 _UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
 _FOREIGN: Final = frozenset(
     {f"foreign_{what}" for what in ("start", "stop", "pause", "modify", "other")}
@@ -130,40 +130,40 @@ class Conductor:
         self._led = first.led
         self._texts = texts
         self._values = PieceValues(texts, first.led.keeping)
-        self._engine = engine
-        self._make_engine = make_engine
-        self._failed = anyio.Event()  # the engine has ended by itself
-        self._has_engine = left is None  # one that is where the run is
-        self._is_past_help = False  # none can be had any more: only Stop is left
-        self._course: list[tuple[float, Returned | Literal["stop"]]] = []
-        self._over: set[int] = set()  # the calls whose outcome is known
-        self._began = first.at
         self._robots = robots
         self._look = look
         self._runs = runs
         self._claims = claims
         self._clock_us = clock_us
         self.gate: Final = LedGate(first, lead, robots, look, clock_us, self._tell)
-        self._left = left
         if left is not None:
             self.gate.take_up(left)
+        self._engine = LeadingEngine(
+            first,
+            engine,
+            make_engine,
+            clock_us,
+            hold=self.gate.hold_run,
+            give_up=self._give_up,
+            left=left,
+        )
+        self._played = PlayedSteps(first, self.gate, self._engine, self._tell, clock_us, left)
         self._leading: Leading | None = None
         self._steps: dict[int, Step] = {}
         self._turns = {name: anyio.Lock() for name in self._led.robots.values()}
         self._pieces = left.sent if left is not None else 0
         self._left_pieces = dict(left.pieces) if left is not None else {}
         self._subscribers = Listeners[Report]()
-        self._listening = ExitStack()
         self._tasks: TaskGroup | None = None
         self._waiting: list[Exact] = []  # the end of the graph, while pieces are open
         self._state = "UNINITIALIZED"  # of the graph, as it was reported
         #: The states of the actions that robots play.
-        self._states = dict(left.states) if left is not None else dict[str, str]()
-        self._others: dict[str, str] = {}  # the states of the other actions
+        self._states = dict[str, str]()
+        self._others = dict[str, str]()  # the states of the other actions, as they were reported
+        for name, state in left.states.items() if left is not None else ():
+            (self._states if name in self._led.players else self._others)[name] = state
         self._unproven = left.unproven if left is not None else None  # rests by what was seen
         self._stopped_by = GRAPH
-        self._is_told_to_stop = False
-        self._replaced = 0
         self._again: dict[str, OpenRun] = {}  # pieces that had ended and move again
         self._stalls = StallWatch(clock_us)
         self._silences: dict[str, Answer | None] = {}  # told, with the robot's last answer before
@@ -173,31 +173,24 @@ class Conductor:
     def leads(self, leading: Leading) -> None:
         """Set the callbacks that record events. Call this once, before the run is driven."""
         self._leading = leading
-        self._listening.enter_context(self._engine.listen(self._hear))
+        self._engine.listen(self._hear)
 
     # --- the link -----------------------------------------------------------------------------
 
     @property
     def standing(self) -> Standing:
         """The condition of the engine. Its incarnation is the id of the run, as engines change."""
-        life = self._first.run
-        if self._is_past_help:
-            return Standing(state="answering", incarnation=life, generation="current", servers=1)
-        return msgspec.structs.replace(self._engine.standing, incarnation=life)
+        return self._engine.standing
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Start the whole graph. `leaves` is called right before that. Raise EngineRefused if the
         engine that plays it refuses it, NotSent or NoAnswer if it cannot be started."""
-        self._began = self._clock_us()
         await self._engine.start(order, leaves)
 
     async def stop(self, graph_name: str) -> None:
         """Stop the whole graph. Nothing begins any more, and every piece gets a Stop that is repeated
         until it is proven."""
         self._stop_pieces(self._stopped_by, is_press=False)
-        if not self._is_told_to_stop:
-            self._is_told_to_stop = True
-            self._course.append((self._now_ms(), "stop"))
         await self._engine.stop(graph_name)
 
     def close(self, author: Author) -> None:
@@ -223,10 +216,8 @@ class Conductor:
     async def get(self) -> Answer:
         """Return the whole graph with the states that the robots showed for its actions. Raise
         NoAnswer while its engine has ended and no other one has taken its place."""
-        if self._is_past_help:
+        if self._engine.is_past_help:
             return self._answer_without_engine()
-        if not self._has_engine:
-            raise NoAnswer("What leads this run is being begun again.")
         answer = await self._engine.get()
         return msgspec.structs.replace(
             answer,
@@ -247,11 +238,18 @@ class Conductor:
 
     def _as_shown(self, graph: Snapshot) -> Snapshot:
         state = self._state if self._is_going and graph.state in TERMINAL else graph.state
-        nodes = {
-            name: self._states.get(name, "UNINITIALIZED") if name in self._led.players else own
-            for name, own in graph.nodes.items()
-        }
+        nodes = {name: self._state_of(graph.graph, name, own) for name, own in graph.nodes.items()}
         return msgspec.structs.replace(graph, state=state, nodes=nodes)
+
+    def _state_of(self, graph: str, node: str, own: str) -> str:
+        """Return the state of an action as people are shown it. `own`: as the engine has it."""
+        if graph != self._first.graph_name:  # inside of an action that the simulator plays
+            return own
+        if node in self._led.players:
+            return self._states.get(node, "UNINITIALIZED")
+        shown = self._others.get(node, "UNINITIALIZED")
+        self._others[node] = self._played.state(node, own, shown)
+        return self._others[node]
 
     async def run(self) -> None:
         """Send the pieces, and pass their outcomes to the engine, until cancelled."""
@@ -261,15 +259,6 @@ class Conductor:
             for step in self._steps.values():  # begun before this task
                 tasks.start_soon(self._lead, step)
             tasks.start_soon(self._stalls.run, self.gate.hold_run)
-            left, self._left = self._left, None
-            if left is not None:
-                self._began, self._course = left.course.began, list(left.course.steps)
-                self._over |= {each.number for _, each in self._course if each != "stop"}
-                await self._bring_back()
-            while True:
-                await self._failed.wait()
-                self._failed = anyio.Event()
-                await self._replace_engine(tasks)
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Return a context during which `hear` is called with every change of the whole graph."""
@@ -277,74 +266,43 @@ class Conductor:
 
     async def aclose(self) -> None:
         """End the engine of the whole graph. Pieces that are still open go on as runs."""
-        self._listening.close()
         await self._engine.aclose()
 
     # --- the engine of the whole graph --------------------------------------------------------
 
     def _hear(self, report: Report) -> None:
         match report:
-            case CallBegan(call=call) if call.number not in {*self._steps, *self._over}:
-                step = self._steps[call.number] = Step(call, self._led.players[call.node])
+            case CallBegan(call=call) if call.number not in self._steps:
+                robot = self._led.players.get(call.node, SIMULATOR)
+                step = self._steps[call.number] = Step(call, robot)
                 if self._tasks is not None:
                     self._tasks.start_soon(self._lead, step)
             case CallStopped(number=number) if number in self._steps:
                 self._end_step(self._steps[number], GRAPH)
             case Transitions(run=run, changes=changes):
                 self._show(run, changes)
-            case EngineChanged(state=("gone" | "busy"), why=why):
-                self.gate.hold_run(f"What leads this run has failed, and was begun again. {why}")
-                self._failed.set()
+            case CallPlayed():
+                self._played.end(report)
             case _:
                 return
 
-    async def _replace_engine(self, tasks: TaskGroup) -> None:
-        """Make another engine in place of one that has failed, and bring it to the same point of
-        the run. After too many failures, make none: only Stop is left."""
-        if self._is_past_help:
-            return
-        self._has_engine = False
-        if self._replaced >= _MOST_ENGINES:
-            self._is_past_help = True
-            text = "What leads this run has failed too often, and is not begun again: stop the run."
-            self._alarm("led_failed", text)
-            return
-        self._replaced += 1
-        old, self._engine = self._engine, self._make_engine()
-        self._listening.enter_context(self._engine.listen(self._hear))
-        tasks.start_soon(self._engine.run)
-        await self._bring_back()
-        await old.aclose()
-
-    async def _bring_back(self) -> None:
-        """Give a new engine the outcomes so far. If that fails, hold the run and replace it."""
-        known = len(self._course)
-        try:
-            course = LedCourse(began=self._began, steps=tuple(self._course))
-            await self._engine.take_up(order_of(self._first), course)
-            self._has_engine = True
-            for _, each in self._course[known:]:
-                if each == "stop":
-                    await self._engine.stop(self._first.graph_name)
-                else:
-                    await self._engine.returned(each)
-        except (EngineRefused, NotSent, NoAnswer) as why:
-            log.warning("run %s: no engine leads it: %s", self._first.run, why)
-            self.gate.hold_run(f"What leads this run cannot be begun again: {why}")
-            self._failed.set()
-
-    def _now_ms(self) -> float:
-        return (self._clock_us() - self._began) / 1000
+    def _give_up(self) -> None:
+        text = "What leads this run has failed too often, and is not begun again: stop the run."
+        self._alarm("led_failed", text)
 
     def _show(self, run: str, changes: tuple[Exact, ...]) -> None:
         """Pass on what the engine of the whole graph reports, except for states of actions that
-        robots carry out. If `changes` end the graph, stop the open pieces."""
+        robots carry out, or that wait. If `changes` end the graph, stop the open pieces."""
         shown: list[Exact] = []
         for each in changes:
-            is_robots = isinstance(each, NodeState | NodeResult) and each.node in self._led.players
-            if not is_robots:
+            is_robots = (
+                isinstance(each, NodeState | NodeResult)
+                and each.graph == self._first.graph_name
+                and each.node in self._led.players
+            )
+            if not is_robots and self._played.shows(each):
                 shown.append(each)
-                if isinstance(each, NodeState):
+                if isinstance(each, NodeState) and each.graph == self._first.graph_name:
                     self._others[each.node] = each.state
         self._waiting += shown
         self._show_what_may_be(run)
@@ -380,9 +338,13 @@ class Conductor:
     # --- one step -----------------------------------------------------------------------------
 
     async def _lead(self, step: Step) -> None:
-        """Lead one step to its outcome: send its piece when its robot is free, and wait for the end."""
+        """Lead one step to its outcome: send its piece when its robot is free, and wait for the end. One
+        that the simulator plays is led until it begins."""
         self._take_up_piece(step)
         try:
+            if step.engine == SIMULATOR:
+                await self._lead_played(step)
+                return
             async with anyio.Lock() if self._led.together else self._turns[step.engine]:
                 await self._lead_in_turn(step)
         except Exception as error:  # the other steps go on; nothing further begins
@@ -390,6 +352,24 @@ class Conductor:
             self.gate.hold_run(f"The runner has a fault at {step.node}: {error!r}")
         step.is_led = False
         self._show_what_may_be(self._first.run)
+
+    async def _lead_played(self, step: Step) -> None:
+        """Let the simulator play a step once the gate is open."""
+        while not step.is_stopped:
+            with step.waiting():
+                await self.gate.admit(step)
+                if not await self._has_stored_causes(step):
+                    continue
+                if self._stalls.stands_still:  # noticed soon, and the run is held then
+                    await anyio.sleep(_STOOD_STILL_S)
+                    continue
+                self.gate.halt_before(step)
+                if self.gate.lets(step) and not step.is_stopped:
+                    self._steps.pop(step.call.number, None)
+                    with anyio.CancelScope(shield=True):
+                        await self._played.begin(step)
+                    return
+        await self._finish(step, "on_stopped", "unsent")
 
     async def _lead_in_turn(self, step: Step) -> None:
         while True:
@@ -422,14 +402,7 @@ class Conductor:
         or stop the run, as the starter chose."""
         await self.gate.admit(step)
         began = anyio.current_time()
-        try:  # nothing begins while its causes are not in the journal
-            with anyio.fail_after(_STORED_S):
-                await self._run.stored()
-                for recorder in tuple(self._unstored):
-                    await recorder.flushed()
-                    self._unstored.discard(recorder)
-        except TimeoutError:
-            self._trouble(step, "unstored", f"Nothing could be stored for {_STORED_S} s.", began)
+        if not await self._has_stored_causes(step):
             return
         robot = self._robots.reachable(step.engine)
         try:
@@ -468,6 +441,21 @@ class Conductor:
             if step.is_stopped:
                 step.piece.stop(self._stopped_by, "")
             self._runs.drive(step.piece, order, cleared.life)
+
+    async def _has_stored_causes(self, step: Step) -> bool:
+        """Wait until everything that a step follows from is in the journal, and return whether it is.
+        If not, act as the starter chose."""
+        began = anyio.current_time()
+        try:
+            with anyio.fail_after(_STORED_S):
+                await self._run.stored()
+                for recorder in tuple(self._unstored):
+                    await recorder.flushed()
+                    self._unstored.discard(recorder)
+        except TimeoutError:
+            self._trouble(step, "unstored", f"Nothing could be stored for {_STORED_S} s.", began)
+            return False
+        return True
 
     def _take_up_piece(self, step: Step) -> None:
         """Follow the piece that an earlier process has sent for a step, if there is one."""
@@ -603,7 +591,6 @@ class Conductor:
         """Record the outcome of a step, and pass it to the engine. `how`: it was told by states of
         the robot ("shape"), by a person ("word"), or no piece was sent ("unsent")."""
         self._steps.pop(step.call.number, None)
-        self._over.add(step.call.number)
         self.gate.passed(step)
         ended = self._values.ended(step, outcome, how, self._clock_us())
         step.tell_end(self._run.tell, ended)
@@ -611,9 +598,7 @@ class Conductor:
             self._alarm("led_unset", f"{step.node} on {step.engine} {lacking}")
         returned = returned_of(ended)
         self.gate.halt_after(step, outcome, returned.outputs)
-        self._course.append((self._now_ms(), returned))
-        with suppress(NotSent, NoAnswer):  # another engine is told by its course
-            await self._engine.returned(returned)
+        await self._engine.returned(returned)
 
     def _end_step(self, step: Step, author: Author) -> None:
         """Begin to stop the piece of a step in the name of `author`, or never send it."""
@@ -655,11 +640,9 @@ class Conductor:
     async def go_on(self, press: GoOn) -> None:
         """Let a held run go on, once every robot that has a step of it has answered. Raise Conflict if
         no engine leads the run, and as `LedGate.go_on` does."""
-        if self._is_past_help:
-            raise Conflict("What leads this run has failed too often: only Stop is left.")
-        if not self._has_engine:
-            raise Conflict("What leads this run is being begun again. Try that in some seconds.")
+        self._engine.require()
         names = {step.engine for step in self._steps.values() if not step.over.is_set()}
+        names.discard(SIMULATOR)
         names |= {piece.run.engine for piece in self._again.values() if piece.run.end is None}
         await self.gate.go_on(press, names)
         for step in self._steps.values():

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
-from typing import Final, Literal
+from typing import Final
 from weakref import WeakValueDictionary
 
 import anyio
@@ -11,11 +11,11 @@ import msgspec
 
 from action_assistant.errors import Conflict, OutcomeUnknown
 from action_assistant.runner.execution.conducted_steps import (
-    CONDUCTED_FACTS,
     GoOn,
     Leading,
     LeftOpen,
     Word,
+    leading_facts,
     order_of,
 )
 from action_assistant.runner.execution.conductor import Conductor
@@ -24,7 +24,7 @@ from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.piece_values import returned_of
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.unread_runs import UNREAD, UnreadRun
-from action_assistant.runner.links.led_calls import LedCourse
+from action_assistant.runner.links.led_calls import CourseStep, LedCourse, Played, Stopped
 from action_assistant.runner.links.port import Leaves, unwatched
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.registry import Robots
@@ -33,6 +33,7 @@ from action_assistant.runner.runs.events import (
     MovesAgain,
     PieceBegan,
     PieceEnded,
+    PlayBegan,
     Published,
     Requested,
     Silent,
@@ -45,7 +46,6 @@ from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText, piece_texts
 from action_assistant.umrf.breakpoints import Breakpoint
-from action_assistant.umrf.semantics import Returned
 from action_assistant.web.auth.identity import Identity
 
 log: Final = logging.getLogger(__name__)
@@ -170,8 +170,9 @@ class Conductors:
                 self._runs.drive(opened)
 
     def _engine_for(self, first: Requested) -> LeadableLink:
-        led = frozenset(first.led.players if first.led is not None else ())
-        return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
+        facts = leading_facts(is_simulated=first.simulated)
+        led = frozenset(first.actions)
+        return self._simulator(facts, first.script, self._runtime.clock_us, led=led)
 
     def once(self, run: str, request_id: str) -> AbstractAsyncContextManager[None]:
         """Return a context that holds the lock of a person's request (by its id) on this run, so
@@ -259,13 +260,14 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
     """Return how far an earlier process led a led run, from its stored events. `first`: the
     first of them; `now`: the run as all of them show it. Raise Unavailable if the journal cannot be
     read."""
-    ends: list[tuple[int, Returned | Literal["stop"]]] = []
+    ends: list[tuple[int, CourseStep]] = []
     began = first.at
     unproven: Run | None = None
     noted: set[str] = set()
     newest: dict[int, str] = {}  # the last noted piece of each call without an outcome
     over: set[int] = set()  # the calls with an outcome
     calls: dict[int, str] = {}
+    played: dict[int, str] = {}
     after = 0
     while events := await history.events(first.run, after, _PAGE):
         after = events[-1].seq
@@ -284,8 +286,12 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
                     newest.pop(call, None)
                     over.add(call)
                     ends.append((at, returned_of(ended)))
+                case PlayBegan(at=at, call=call, node=node):
+                    calls[call] = played[call] = node
+                    over.add(call)
+                    ends.append((at, Played(call, node)))
                 case StopRequested(at=at):
-                    ends.append((at, "stop"))
+                    ends.append((at, Stopped()))
     pieces: dict[int, tuple[Run, int]] = {}
     again: list[tuple[Run, int]] = []
     sent = await history.piece_ids(first.run)
@@ -307,9 +313,10 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
         sent=max(map(piece_number, sent), default=0),
         pieces=pieces,
         again=tuple(again),
-        states={name: each.state for name, each in now.actions.items() if each.robot},
+        states={name: each.state for name, each in now.actions.items()},
         unproven=unproven,
         calls=calls,
+        played=played,
         breakpoints=now.breakpoints,
     )
 

@@ -114,7 +114,7 @@ class LedCommands:
             if found is not None:
                 return found
             opened = no_piece(await self._movable(run))
-            if opened.run.led is None or opened.run.simulated:
+            if opened.run.led is None:
                 raise Conflict("Its engine has the whole graph: only a run that is led can wait.")
             if opened.run.desired == "stopped":
                 raise Conflict("The run is being stopped.")
@@ -129,7 +129,7 @@ class LedCommands:
         breakpoints than the author saw, BadInput for a place where no run can wait; Forbidden or
         Conflict if one is taken away and the author may not start on each robot of the run."""
         opened = no_piece(await self._movable(run))
-        if opened.run.led is None or opened.run.simulated:
+        if opened.run.led is None:
             raise Conflict("Its engine has the whole graph: only a run that is led can wait.")
         first = await self._requested(run)
         wanted = await self._in_worker(pinned_for_text, first.umrf, asked.breakpoints)

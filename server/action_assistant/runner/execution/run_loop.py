@@ -387,7 +387,7 @@ class OpenRun:
             if waited >= _UNCONFIRMED_S:
                 why = failed or self.watch.trouble or "no proof has come"
                 self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}.")
-            if self._owns_link and self._pressed is None and waited >= _SWITCH_OFF_S:
+            if self.run.simulated and waited >= _SWITCH_OFF_S:
                 why = self._stopping.hung or f"It does not obey: {self.watch.trouble}."
                 self.end("lost", f"{why} The simulated engine was switched off.")
                 return

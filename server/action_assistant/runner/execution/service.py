@@ -551,7 +551,7 @@ class ExecutionService:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is
         the number of its last stored event; `is_whole` says that all of its events could be
         read."""
-        if run.led is not None and not run.simulated:
+        if run.led is not None:
             try:
                 if is_whole:
                     await self._conductors.take_up(run, seq)

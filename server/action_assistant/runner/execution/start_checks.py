@@ -15,7 +15,7 @@ from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
-from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS
+from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS, leading_facts
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
@@ -106,7 +106,7 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def breakpoints(self) -> tuple[Breakpoint, ...]:
         """The breakpoints at which the run will wait: none if its engine gets the whole graph."""
-        return self.led.pieces.breakpoints if self.led and not self.is_simulated else ()
+        return self.led.pieces.breakpoints if self.led else ()
 
 
 class LedStart(msgspec.Struct, frozen=True, kw_only=True):
@@ -261,14 +261,15 @@ class StartChecks:
             return await self._accept_on(robot, part, own, starter, order=order, is_led=True)
 
         accepted = await _all_accepted(parts, accept)
-        led = frozenset(ready.players)
-        engine = self._simulator(CONDUCTED_FACTS, ready.whole.script, self._clock_us, led=led)
+        facts = leading_facts(is_simulated=not parts)
+        led = frozenset(ready.whole.actions)
+        engine = self._simulator(facts, ready.whole.script, self._clock_us, led=led)
         return AcceptedStart(
             request=request,
             prepared=ready.whole,
             link=engine,
             is_simulated=not parts,
-            incarnation=ready.whole.run if parts else engine.standing.incarnation,
+            incarnation=ready.whole.run,
             despite=_each_once(
                 _overridden(ready.whole, items), *(each.despite for each in accepted)
             ),
@@ -479,8 +480,7 @@ class StartChecks:
             item = preflight.refusal_item(_code_of(refused), refused)
             return [preflight.with_verdict(CONDUCTED, [item])]
         whole = ready.whole
-        is_simulated = not engines_of(request)
-        marks = preflight.breakpoint_items(request.breakpoints, is_led=not is_simulated)
+        marks = preflight.breakpoint_items(request.breakpoints, is_led=True)
         items = [preflight.graph_item(whole), *led_items(ready), *marks]
         found = [preflight.with_verdict(CONDUCTED, items, whole.digest, whole.tree_digest)]
         for name in engines_of(request):

@@ -185,7 +185,7 @@ class StartPipeline:
         robots = engines_of(accepted.request)
         claim = claim_of(accepted.request, accepted.prepared)
         may_leave = partial(self._rights.require_still, robots, starter, claim)
-        if accepted.led is None or accepted.is_simulated:
+        if accepted.led is None:
             is_simulated = accepted.is_simulated
             return self._runs.open(
                 run, accepted.link, owns_link=is_simulated, seq=1, may_leave=may_leave

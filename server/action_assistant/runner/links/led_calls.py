@@ -1,34 +1,54 @@
 """The performer of a led run: tells which actions the engine of the whole graph begins and stops.
 
-The engine of a led run carries out nothing itself. Each call of an action becomes a report,
-and whoever conducts the run reports the end of the call with `returned`.
+The engine of a led run begins nothing itself. Each call of an action becomes a report. Whoever
+conducts the run reports the end of the call with `returned`, if a robot has carried it out, or lets
+the script play the call with `play`.
 """
 
-from collections.abc import Collection
-from typing import Literal
+from collections.abc import Collection, Mapping
+from typing import Any, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.links.port import CallBegan, CallStopped
-from action_assistant.umrf.model import Action
+from action_assistant.runner.links.port import CallBegan, CallPlayed, CallStopped
+from action_assistant.umrf.model import Action, Precondition
 from action_assistant.umrf.semantics import Call, Returned
+
+
+class Played(msgspec.Struct, frozen=True):
+    """The script was let play the call with this number, of the action with the full name `node`."""
+
+    number: int
+    node: str
+
+
+class Stopped(msgspec.Struct, frozen=True):
+    """The whole graph of the led run was stopped by a person or the runner."""
+
+
+#: What brings the engine of a led run from one state to the next, apart from time.
+CourseStep: TypeAlias = Returned | Played | Stopped
 
 
 class LedCourse(msgspec.Struct, frozen=True, kw_only=True):
     """The course of a led run so far, from which a new engine gets to the same states.
 
-    `began`: when the graph was started, in microseconds UTC. `steps`: in order, the ends of calls
-    and the Stop, each with its time in milliseconds after the start.
+    `began`: when the graph was started, in microseconds UTC. `steps`: in order, the ends of calls,
+    the calls that the script plays and the Stop, each with its time in milliseconds after the start.
     """
 
     began: int
-    steps: tuple[tuple[float, Returned | Literal["stop"]], ...]
+    steps: tuple[tuple[float, CourseStep], ...]
+
+
+#: The reports about calls.
+CallNews: TypeAlias = CallBegan | CallStopped | CallPlayed
 
 
 class LedCalls:
     """Stands in for behaviours in the engine that plays a led run: collects the calls that
-    robots carry out until the link reports them. `led`: the full names of these actions; the script
-    says how the others behave."""
+    are to begin until the link reports them. `led`: the full names of the actions that begin only
+    when the conductor says so; the others follow the script at once."""
 
     takes_graphs = True
     is_killing = False
@@ -36,16 +56,18 @@ class LedCalls:
 
     def __init__(self, led: Collection[str]) -> None:
         self._led = frozenset(led)
-        self._news: list[CallBegan | CallStopped] = []
+        self._news: list[CallNews] = []
+        #: The full names of the actions of all calls so far, by number.
+        self.nodes: dict[int, str] = {}
 
     def performs(self, action: Action, *, inside: bool) -> bool:
-        """Return whether a robot carries out this action. `inside`: it is in a sub-graph; then the
-        result is False: either the engine plays the sub-graph, or a robot carries it out as a
-        whole."""
+        """Return whether the conductor lets this action begin. `inside`: it is in a sub-graph; then
+        the result is False: a sub-graph begins as a whole, in the engine or on a robot."""
         return not inside and action.full_name in self._led
 
     def begin(self, call: Call) -> None:
         """Add the begin of a call to the news."""
+        self.nodes[call.number] = call.node
         self._news.append(CallBegan(call=call))
 
     def stop(self, number: int) -> None:
@@ -64,8 +86,13 @@ class LedCalls:
         """Return None and do nothing: only a proof ends a call that a robot carries out."""
         return None
 
-    def news(self) -> list[CallBegan | CallStopped]:
-        """Return the calls that began or were stopped since the last time, oldest first."""
+    def ended(self, number: int, result: Precondition, outputs: Mapping[str, Any]) -> None:
+        """Add to the news that a call which the script has played has ended."""
+        self._news.append(CallPlayed(number=number, outcome=result, outputs=dict(outputs)))
+
+    def news(self) -> list[CallNews]:
+        """Return the calls that began, were stopped or were played to their end since the last time,
+        oldest first."""
         news, self._news = self._news, []
         return news
 

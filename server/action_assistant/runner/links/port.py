@@ -8,14 +8,14 @@ start.
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Annotated, Final, Literal, Protocol, TypeAlias
+from typing import Annotated, Any, Final, Literal, Protocol, TypeAlias
 
 import msgspec
 
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.model import Graph
+from action_assistant.umrf.model import Graph, Precondition
 from action_assistant.umrf.semantics import Call
 
 #: The engine that is always there.
@@ -170,7 +170,7 @@ class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CallBegan(msgspec.Struct, frozen=True, kw_only=True):
-    """The engine of a led run has begun an action that a robot shall carry out."""
+    """The engine of a led run has come to an action, which begins when the conductor says so."""
 
     call: Call
 
@@ -181,8 +181,25 @@ class CallStopped(msgspec.Struct, frozen=True, kw_only=True):
     number: int
 
 
+class CallPlayed(msgspec.Struct, frozen=True, kw_only=True):
+    """The engine of a led run has itself played the call with this number to its end. `outputs`: its
+    values by flat name; `is_past`: an earlier engine had done so before."""
+
+    number: int
+    outcome: Precondition
+    outputs: dict[str, Any]
+    is_past: bool = False
+
+
 Report: TypeAlias = (
-    Transitions | Feedback | EngineLog | EngineChanged | ForeignCommand | CallBegan | CallStopped
+    Transitions
+    | Feedback
+    | EngineLog
+    | EngineChanged
+    | ForeignCommand
+    | CallBegan
+    | CallStopped
+    | CallPlayed
 )
 
 

@@ -66,7 +66,7 @@ _GONE: Final = "The simulated engine was switched off."
 _DIED: Final = "The process of the simulated engine has died, and the engine with it."
 
 _COMMANDS: Final = frozenset(
-    {"start", "stop", "pause", "resume", "modify", "get", "returned", "take_up"}
+    {"start", "stop", "pause", "resume", "modify", "get", "returned", "play", "take_up"}
 )
 
 
@@ -190,6 +190,11 @@ class SimulatedLink:
         """Give the engine the end (outcome and outputs) of a call that a robot carried out. Raise
         NotSent if the process has ended."""
         await self._request("returned", returned)
+
+    async def play(self, number: int) -> None:
+        """Send the engine the command to play the call with this number itself. Do not wait for its
+        effect."""
+        self._say(next(self._numbers), "play", number)
 
     async def stop(self, graph_name: str) -> None:
         """Send the engine the command to stop a graph. Do not wait for its effect."""

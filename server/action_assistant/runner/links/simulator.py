@@ -16,7 +16,7 @@ import msgspec
 from action_assistant.errors import Unavailable
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
-from action_assistant.runner.links.led_calls import LedCalls, LedCourse
+from action_assistant.runner.links.led_calls import CourseStep, LedCalls, LedCourse, Played, Stopped
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import (
     Exact,
@@ -31,6 +31,8 @@ from action_assistant.runner.links.parameter_texts import Values, values_of
 from action_assistant.runner.links.port import (
     Answer,
     CallBegan,
+    CallPlayed,
+    CallStopped,
     EngineChanged,
     EngineRefused,
     EngineState,
@@ -56,6 +58,7 @@ _QUICKEST_S: Final = 0.01
 
 
 _GRAIN_MS: Final = 0.01  # what is due within this time is due now
+_MOST_AHEAD: Final = 1000  # engine steps for which a call of a course is waited
 _SLICE: Final = 50  # engine steps between two turns of the event loop
 
 
@@ -67,10 +70,15 @@ class LeadableLink(Link, Protocol):
         NotSent if the engine cannot take it."""
         ...
 
+    async def play(self, number: int) -> None:
+        """Let the engine itself play the call with this number, which begins by that. Do not wait
+        for its effect."""
+        ...
+
     async def take_up(self, order: Order, course: LedCourse) -> None:
         """Start the graph in `order` and bring it to the point that an earlier engine had reached
-        by the events in `course`. Only the calls that are still open are reported. Raise
-        EngineRefused or NotSent if that cannot be done."""
+        by the events in `course`. Only calls that are still open are reported, and those that the
+        engine has played to their end. Raise EngineRefused or NotSent if that cannot be done."""
         ...
 
 
@@ -216,10 +224,17 @@ class SimulatorLink:
         if self._dead is None:
             self._tell(self._engine.returned(returned, self._now()))
 
+    async def play(self, number: int) -> None:
+        """Let the script play the call with this number from now on. Does nothing if the engine has
+        crashed or hangs."""
+        if self._dead is None:
+            self._tell(self._engine.play(number, self._now()))
+
     async def take_up(self, order: Order, course: LedCourse) -> None:
         """Start the graph in `order` and bring it to the point that an earlier engine had reached
-        by the events in `course`. Only the calls that are still open are reported. Raise
-        EngineRefused if the engine refuses the graph, or crashes in the course."""
+        by the events in `course`. Only calls that are still open are reported, and those that the
+        script has played to their end. Raise EngineRefused if the engine refuses the graph, or
+        crashes in the course."""
         name = order.graph.name
         self._runs[name] = order.run
         self._engine.library = {**self._engine.library, **_inside(order)}
@@ -232,22 +247,49 @@ class SimulatorLink:
             self._engine.start(_whole(order), 0.0)
         except semantics.GraphRefused as refused:
             raise EngineRefused(str(refused)) from refused
-        over = {step.number for _, step in course.steps if isinstance(step, Returned)}
+        over = {step.number for _, step in course.steps if not isinstance(step, Stopped)}
         past_ms = 0.0
         for at_ms, step in course.steps:
-            past_ms = at_ms = max(past_ms, at_ms)
-            if isinstance(step, Returned):
-                self._engine.returned(step, at_ms)
-            else:
-                self._engine.stop(name, at_ms)
+            self._require_call(step)
+            past_ms = at_ms = max(past_ms, at_ms, self._engine.now)
+            match step:
+                case Returned():
+                    self._engine.returned(step, at_ms)
+                case Played(number=number):
+                    self._engine.play(number, at_ms)
+                case Stopped():
+                    self._engine.stop(name, at_ms)
+        past = self._performer.news() if isinstance(self._performer, LedCalls) else []
         self._engine.advance(self._now())
         if self._engine.crashed or self._engine.locked:
             raise EngineRefused("its course ends the engine again")
         self._wake.set()
+        for each in past:
+            match each:
+                case CallPlayed():
+                    self._subscribers.tell(msgspec.structs.replace(each, is_past=True))
+                case CallBegan(call=call) if call.number not in over:
+                    self._subscribers.tell(each)
+                case CallStopped(number=number) if number not in over:
+                    self._subscribers.tell(each)
+                case _:
+                    pass
         for each in self._performer.news() if isinstance(self._performer, LedCalls) else ():
-            number = each.call.number if isinstance(each, CallBegan) else each.number
-            if number not in over:
-                self._subscribers.tell(each)
+            self._subscribers.tell(each)
+
+    def _require_call(self, step: CourseStep) -> None:
+        """Let the engine go on until the call of a step of its course has begun, which a clock may
+        have noted too early. Raise EngineRefused if that does not begin, or is another action's."""
+        if isinstance(step, Stopped) or not isinstance(self._performer, LedCalls):
+            return
+        nodes = self._performer.nodes
+        for _ in range(_MOST_AHEAD):
+            if step.number in nodes or self._engine.due is None:
+                break
+            self._engine.advance(self._engine.due)
+        node = nodes.get(step.number)
+        if node is None or (isinstance(step, Played) and node != step.node):
+            raise EngineRefused("its course cannot be repeated")
 
     async def get(self) -> Answer:
         """Return all graphs that the engine holds now. Raises NoAnswer, also while a behaviour is being killed,

@@ -337,6 +337,16 @@ class PieceBegan(msgspec.Struct, frozen=True, kw_only=True):
     piece: str
 
 
+class PlayBegan(msgspec.Struct, frozen=True, kw_only=True):
+    """The simulator plays a call of a led run from now on."""
+
+    kind: ClassVar[str] = "run.play_began.v1"
+
+    at: int
+    call: int
+    node: str
+
+
 class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The robot that plays an action of a led run shows it in another state. `visit`: its
     visit with the bounds that the observations of the robot allow; None before it was seen running
@@ -501,6 +511,7 @@ RunEvent: TypeAlias = (
     | Ended
     | MovesAgain
     | PieceBegan
+    | PlayBegan
     | PieceSeen
     | PieceRest
     | PieceEnded
@@ -535,6 +546,7 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         Ended,
         MovesAgain,
         PieceBegan,
+        PlayBegan,
         PieceSeen,
         PieceRest,
         PieceEnded,

@@ -41,6 +41,7 @@ from action_assistant.runner.runs.events import (
     PieceRest,
     PieceSeen,
     PieceWaits,
+    PlayBegan,
     Proof,
     Published,
     Released,
@@ -202,6 +203,8 @@ def follow(run: Run, event: RunEvent) -> Run:
             action = replace(run.actions.get(event.node, _UNSEEN), piece=event.piece)
             actions, waits = run.actions | {event.node: action}, _without(run.waits, event.call)
             return _piece_rest(replace(run, actions=actions, waits=waits), _going(event))
+        case PlayBegan(call=call):
+            return replace(run, waits=_without(run.waits, call))
         case PieceRest():
             return _piece_rest(run, event)
         case Requested() | Unknown():

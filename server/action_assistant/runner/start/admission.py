@@ -422,7 +422,7 @@ def _script(request: StartRequest) -> tuple[Script, str]:
     raw = bytes(request.script).strip()
     if raw in {b"", b"null"}:
         return Script({}), ""
-    if request.engine != SIMULATOR:
+    if SIMULATOR not in {request.engine, *request.robots.values()}:
         raise BadInput("Only the simulator follows a script.", where={"path": "/script"})
     try:
         script = script_from(msgspec.json.decode(raw))

@@ -35,6 +35,7 @@ from action_assistant.umrf.semantics.trace import (
     EdgeEval,
     GraphResultEvent,
     NodeResultEvent,
+    NodeStateEvent,
     NotReady,
 )
 from action_assistant.umrf.semantics.transitions import EFFECTS
@@ -237,6 +238,8 @@ class Core(Clock):
             return
         node.token += 1
         node.call = node.behaviours[min(node.calls, len(node.behaviours) - 1)]
+        if node.call is PERFORMED:
+            node.subgraph = None  # of an earlier call that the script has played
         if node.subgraph is not None:
             node.calls += 1
             self._state(graph, node, "RUNNING")
@@ -336,6 +339,35 @@ class Core(Clock):
             )
             self._ended(graph, node, _OUTCOMES[returned.result])
 
+    def _play(self, number: int) -> None:
+        """Let the script play a call that a performer was given and does not carry out; do nothing if
+        there is no such call. One that was told to stop meanwhile ends without having begun."""
+        found = self._performed.play(number)
+        if found is None:
+            return
+        graph, node, execution = found
+        execution.began_ms = execution.ends_ms = self.now
+        if node.execution is not execution or self.graphs.get(graph.name) is not graph:
+            return
+        if node.busy_until == inf:
+            node.busy_until = self.now
+        if node.state != "RUNNING":
+            if node.active:
+                self._ended(graph, node, "on_stopped")
+            return
+        calls = self.script.calls_of(graph.name, graph.own, node.full_name, node.name)
+        node.call = calls[min(node.calls, len(calls)) - 1]
+        node.subgraph = self._fitting(graph, node)
+        actor = graph.actor_of(node)
+        self._out.append(NodeStateEvent(self._t(), graph.name, node.full_name, "RUNNING", actor))
+        if node.subgraph is not None:
+            self._soon(partial(self._start_sub, graph, node, node.subgraph))
+        elif node.call.init_error or node.call.no_library:
+            self._ended(graph, node, "on_error")
+        else:
+            loads_ms = node.call.load_s * 1000 if node.calls == 1 else 0.0
+            self._let_run(graph, node, inf if node.call.never else loads_ms + self._takes_ms(node))
+
     def _ended(self, graph: Running, node: Node, result: Outcome) -> None:
         """Handle the return of an action's `onRun` with `result`, or the exception that it threw
         (`on_error`): show its state, fill its outputs and inform its children."""
@@ -350,6 +382,7 @@ class Core(Clock):
         if node.subgraph is None and result != "on_error":  # also after a stop
             fill_outputs(node.outputs, node.call.outputs)
         self._result(graph, node, result)
+        self._performed.ended(node, result)
         failed = result == "on_error" and node.subgraph is None
         if failed:
             self._state(graph, node, "ERROR")
@@ -510,6 +543,9 @@ class Core(Clock):
         return True
 
     # Sub-graphs; `Engine` knows how graphs start and stop
+
+    def _fitting(self, graph: Running, node: Node) -> Graph | None:
+        raise NotImplementedError
 
     def _start_sub(self, graph: Running, node: Node, sub: Graph) -> None:
         raise NotImplementedError

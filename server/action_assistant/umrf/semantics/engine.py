@@ -177,6 +177,14 @@ class Engine(Graphs):
             self._performed_returns(returned)
         return self._taken()
 
+    def play(self, number: int, at_ms: float) -> list[Trace]:
+        """Let, at `at_ms`, the script play a call that the performer was given and will not carry
+        out: only now it begins. Return the trace up to then."""
+        self._run_until(at_ms)
+        if not self.crashed:
+            self._play(number)
+        return self._taken()
+
     # Helpers of the commands
 
     def _taken(self) -> list[Trace]:

@@ -99,6 +99,13 @@ class Graphs(Core):
                 node.subgraph = indexed.fitting(node.name, node.inputs.keys(), node.outputs.keys())
         return running
 
+    def _fitting(self, graph: Running, node: Node) -> Graph | None:
+        """Return the sub-graph that an action of a graph stands for; None for an action with code."""
+        if node.name in graph.own_names():
+            return None
+        names = node.inputs.keys(), node.outputs.keys()
+        return IndexedGraphs(self.library).fitting(node.name, *names)
+
     def _resolves(self, graph: Running) -> bool:
         """Return whether the engine can resolve every action that it has to run itself, as an
         action or as a sub-graph."""

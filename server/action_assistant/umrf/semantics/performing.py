@@ -4,11 +4,12 @@ they behave.
 A performed action never ends by itself: the performer reports its end (`Engine.returned`).
 """
 
+from collections.abc import Mapping
 from typing import Any, Final, Protocol
 
 import msgspec
 
-from action_assistant.umrf.model import Action
+from action_assistant.umrf.model import Action, Precondition
 from action_assistant.umrf.semantics.parts import Execution, Node, Running
 from action_assistant.umrf.semantics.script import Behaviour
 from action_assistant.umrf.semantics.values import Opaque
@@ -75,6 +76,10 @@ class Performer(Protocol):
         passed, and return a message about it for people, None if there is none. The end is then
         reported like any other return."""
 
+    def ended(self, number: int, result: Precondition, outputs: Mapping[str, Any]) -> None:
+        """Take the end of a call that was given back to the script (`Engine.play`). `outputs`: its
+        values by flat name."""
+
 
 class PerformedCalls:
     """Tracks the calls that a performer carries out for one engine until all of their code has
@@ -83,6 +88,7 @@ class PerformedCalls:
     def __init__(self, performer: Performer | None) -> None:
         self._performer = performer
         self._going: dict[int, tuple[Running, Node, Execution]] = {}
+        self._played: dict[Execution, int] = {}  # calls that were given back to the script
         self._newest = 0
 
     def performs(self, action: Action, *, inside: bool) -> bool:
@@ -145,6 +151,26 @@ class PerformedCalls:
         """Remove the call with this number, which has ended, and return its graph, node and
         execution; None if there is no such call."""
         return self._going.pop(number, None)
+
+    def play(self, number: int) -> tuple[Running, Node, Execution] | None:
+        """Give the call with this number back to the script; return its graph, node and execution,
+        None if there is no such call."""
+        found = self.take(number)
+        if found is not None:
+            found[2].number = 0
+            self._played[found[2]] = number
+        return found
+
+    def ended(self, node: Node, result: Precondition) -> None:
+        """Tell the performer that the action's call has ended, if it was given back to the script."""
+        number = self._played.pop(node.execution, 0) if node.execution is not None else 0
+        if self._performer is not None and number:
+            outputs = {
+                name: slot.value
+                for name, slot in node.outputs.items()
+                if slot.has_value() and not isinstance(slot.value, Opaque)
+            }
+            self._performer.ended(number, result, outputs)
 
     def _number(self, node: Node) -> int:
         """Return the number of the node's open call; 0 without one."""

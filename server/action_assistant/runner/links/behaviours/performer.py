@@ -5,12 +5,12 @@ import ctypes
 import logging
 import threading
 import time
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 from action_assistant.runner.links.behaviours.call_process import CallProcess
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
-from action_assistant.umrf.model import Action
+from action_assistant.umrf.model import Action, Precondition
 from action_assistant.umrf.semantics import Call, Returned
 
 log: Final = logging.getLogger(__name__)
@@ -97,6 +97,9 @@ class BehaviourPerformer:
                 return None
             self._given_up.add(number)
         return process.kill(_GIVEN_UP)
+
+    def ended(self, number: int, result: Precondition, outputs: Mapping[str, Any]) -> None:
+        """Do nothing: no call of a behaviour is given back to the script."""
 
     def taken(self) -> list[Returned]:
         """Return the results of the calls that have ended since the last time."""
