@@ -242,16 +242,19 @@ export function letGoOn(
   });
 }
 
-/** Let one action of a held run begin, if it is still held since this moment, and hold it again. */
+/** How far a held run goes on: one action, or all that come before another one. */
+export type StepGoal = { readonly action: string } | { readonly until: string };
+
+/** Let a held run go on so far, if it is still held since this moment, and hold it again. */
 export function letStep(
   runner: string,
   run: string,
   since: string,
-  action: string,
+  goal: StepGoal,
   watching: Watching = {},
 ): Promise<Run> {
-  return sendPress(["step", run, since, action].join(" "), (request) => {
-    const body = { since, request_id: request, watching, action };
+  return sendPress(["step", run, since, JSON.stringify(goal)].join(" "), (request) => {
+    const body = { since, request_id: request, watching, ...goal };
     return runnerAt(runner).post("/api/runs/{run}/step", { path: { run }, body });
   });
 }

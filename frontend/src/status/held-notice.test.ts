@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Run } from "../api/runs";
-import { heldWords } from "./held-notice";
+import { heldWords, laterActions } from "./held-notice";
 
 const held = { by: null, why: "Look_0 on David: the robot does not answer.", since: "2026-01-01" };
 const run = (part: object) =>
@@ -48,4 +48,12 @@ test("a run that is not held, is being stopped or is over waits for nobody", () 
   expect(heldWords(run({ held: null }), NONE)).toBeNull();
   expect(heldWords(run({ desired: "stopped" }), NONE)).toBeNull();
   expect(heldWords(run({ ended_at: "2026-01-01" }), NONE)).toBeNull();
+});
+
+test("a run can go on until an action that does not wait to begin already, and is none of a level", () => {
+  const seen = { state: "UNINITIALIZED", robot: "David" };
+  const actions = { Drive_0: seen, Grip_0: seen, Lift_0: seen, "task__Lift__0/Turn_0": seen };
+  const next = [{ action: "Grip_0", robot: "David" }];
+  expect(laterActions(run({ actions, held: { ...held, next } }))).toEqual(["Drive_0", "Lift_0"]);
+  expect(laterActions(run({ actions: {} }))).toEqual([]);
 });

@@ -1,7 +1,9 @@
 /** A led run that waits for a person: the reason, what moves all the same, *Step* and *Go on*. */
+import { NativeSelect } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconHandStop, IconPlayerPlayFilled, IconPlayerTrackNext } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
+import { useState } from "react";
 import { errorText, isOutcomeUnknown } from "../api/http";
 import { enginesOf } from "../api/led-runs";
 import { silentRobots } from "../api/live-socket";
@@ -9,7 +11,7 @@ import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import { SIMULATOR } from "../api/robots";
 import { MOVES } from "../api/run-stop";
-import { letGoOn, letStep, type Run } from "../api/runs";
+import { letGoOn, letStep, type Run, type StepGoal } from "../api/runs";
 import { HoldButton } from "../ui/hold-button";
 import { isolated } from "../words/isolated";
 import style from "./held-notice.module.css";
@@ -23,7 +25,8 @@ const NEXT = 3; // buttons of actions that wait
 
 /** An action and its robot in words; the robot is "" in the simulator. */
 function placeWords(run: Run, action: string, robot: string): string {
-  return `${actionWords(run, action)} on ${robot ? isolated(robot) : "the simulator"}`;
+  const where = robot === "" || robot === SIMULATOR ? "the simulator" : isolated(robot);
+  return `${actionWords(run, action)} on ${where}`;
 }
 
 /**
@@ -77,25 +80,34 @@ function failure(error: unknown, run: Run) {
   };
 }
 
+/** Return the actions until which a held run can go on: those of its graph that do not wait already. */
+export function laterActions(run: Run): string[] {
+  const ready = new Set((run.held?.next ?? []).map(({ action }) => action));
+  return Object.keys(run.actions ?? {}).filter((name) => !name.includes("/") && !ready.has(name));
+}
+
 function StartButtons({ run, since }: { run: Run; since: string }) {
   const { live, runner, now } = useLive();
   const watch = useWatching(enginesOf(run));
   const press = useMutation({
-    /** `action`: the only one to begin; null for all. */
-    mutationFn: (action: string | null) =>
-      action === null
+    /** `goal`: how far it goes on; null for no limit. */
+    mutationFn: (goal: StepGoal | null) =>
+      goal === null
         ? letGoOn(runner ?? "", run.id, since, watch.watching)
-        : letStep(runner ?? "", run.id, since, action, watch.watching),
+        : letStep(runner ?? "", run.id, since, goal, watch.watching),
     onSuccess: (fresh) => live?.learn(fresh),
     onError: (error) => notifications.show(failure(error, run)),
     onSettled: watch.forget,
   });
+  const [until, setUntil] = useState("");
+  const later = laterActions(run);
+  const end = until === "" ? "" : ` until ${actionWords(run, until)} is about to begin`;
   const obstacle = press.isPending ? "Asking …" : watch.obstacle;
   const disabled = obstacle !== null || now.link !== "live";
   const robots = enginesOf(run).filter((engine) => engine !== SIMULATOR);
   const players = robots.map(isolated).join(", ");
   const moves =
-    players === "" ? "Nothing but the simulator moves." : `${players} may begin to move.`;
+    players === "" ? "Only the simulator plays: nothing moves." : `${players} may begin to move.`;
   return (
     <>
       <WatchTicks watch={watch} />
@@ -108,9 +120,9 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
             icon={<IconPlayerTrackNext size={13} aria-hidden />}
             label={`Step: ${actionWords(run, action)}`}
             name={`Let only ${place} begin, then wait again`}
-            question={`Let only ${place} begin? It may move at once.`}
+            question={`Let only ${place} begin? ${robot === SIMULATOR ? "Nothing moves." : "It may move at once."}`}
             disabled={disabled}
-            onHeld={() => press.mutate(action)}
+            onHeld={() => press.mutate({ action })}
           />
         );
       })}
@@ -118,11 +130,23 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
         size="compact-sm"
         icon={<IconPlayerPlayFilled size={13} aria-hidden />}
         label={obstacle ?? "Hold to go on"}
-        name={`Let run ${run.number} go on`}
-        question={`Let run ${run.number} go on? ${moves}`}
+        name={`Let run ${run.number} go on${end}`}
+        question={`Let run ${run.number} go on${end}? ${moves}`}
         disabled={disabled}
-        onHeld={() => press.mutate(null)}
+        onHeld={() => press.mutate(until === "" ? null : { until })}
       />
+      {later.length > 0 && (
+        <NativeSelect
+          size="xs"
+          aria-label="How far it goes on"
+          value={until}
+          data={[
+            { value: "", label: "to its end, or a breakpoint" },
+            ...later.map((name) => ({ value: name, label: `until ${actionWords(run, name)}` })),
+          ]}
+          onChange={(event) => setUntil(event.currentTarget.value)}
+        />
+      )}
     </>
   );
 }

@@ -1,0 +1,77 @@
+/** A led run in the simulator: it waits at a breakpoint, goes step by step, and says why on the phone too. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { card, holdEnter, saved } from "./canvas";
+import { type Person, Product } from "./product";
+
+const product = new Product();
+let ada: Person;
+
+test.beforeAll(async ({ browser }) => {
+  await product.start();
+  ada = await product.person(browser, "Ada");
+});
+test.afterAll(async () => {
+  expect(ada.failures).toEqual([]);
+  await product.dispose();
+});
+
+const dialog = (page: Page) => page.getByRole("dialog");
+const waits = (page: Page) =>
+  page.getByRole("region", { name: "The run waits for a person" }).filter({ visible: true });
+const runs = () => product.ask<{ id: string; state: string }[]>("/api/runs", {}, product.runnerUrl);
+
+/** Three actions, one after the other. */
+async function line(): Promise<string> {
+  const names = ["Drive", "Grip", "Lift"].map((name) => ({ name, instance_id: 0 }));
+  const actions = names.map((each, i) => ({
+    ...{ ...each, type: "sync" },
+    ...{ parents: names.slice(Math.max(0, i - 1), i), children: names.slice(i + 1, i + 2) },
+  }));
+  const ends = { graph_entry: names.slice(0, 1), graph_exit: names.slice(2) };
+  const body = JSON.stringify({ graph_name: "line", ...ends, actions });
+  const headers = { "content-type": "application/json" };
+  const made = await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers });
+  return made.id;
+}
+
+test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends it at the gate", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${await line()}`);
+  await saved(page);
+  await card(page, "Grip").click({ position: { x: 40, y: 24 } });
+  await page.keyboard.press("F9");
+  await saved(page);
+  const led = dialog(page).getByRole("radio", { name: /^Lead it/ });
+  const start = dialog(page).getByRole("button", { name: /^Start v\d+, step by step, on/ });
+
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await expect(led).toBeChecked();
+  await expect(dialog(page)).toContainText("Only the simulator plays: nothing moves.");
+  await expect(dialog(page)).toContainText("The run waits at 1 breakpoint.", { timeout: 15_000 });
+  await expect(start).toBeEnabled({ timeout: 15_000 });
+  await holdEnter(page, start);
+
+  await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });
+  const step = (name: string) =>
+    waits(page).getByRole("button", { name: `Let only ${name} on the simulator begin` });
+  await expect(step("Grip 0")).toBeVisible();
+  await expect(card(page, "Grip")).not.toContainText("running");
+  const desktop = page.viewportSize() ?? { width: 1440, height: 900 };
+  await page.setViewportSize({ width: 390, height: 844 });
+  await expect(waits(page)).toContainText("Breakpoint before Grip");
+  await page.setViewportSize(desktop);
+
+  const far = waits(page).getByRole("combobox", { name: "How far it goes on" });
+  await expect(far.getByRole("option")).toContainText(["to its end", "until Drive", "until Lift"]);
+  await far.selectOption("Lift_0");
+  await holdEnter(
+    page,
+    waits(page).getByRole("button", { name: /until Lift 0 is about to begin$/ }),
+  );
+  await expect(waits(page)).toContainText("It went on until Lift_0", { timeout: 15_000 });
+  await expect(step("Lift 0")).toBeVisible();
+  await page.getByRole("button", { name: /^Stop/ }).first().click();
+  await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
+  await expect(waits(page)).toBeHidden();
+});
