@@ -146,3 +146,41 @@ test("graphs are moved into folders by keys, found there, and none is lost with 
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("of many graphs a page is loaded, more by keys, and a search finds what is not loaded", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  for (let n = 0; n < 70; n += 1) {
+    await product.ask("/api/graphs", {
+      method: "POST",
+      body: JSON.stringify({ name: `many ${n}` }),
+    });
+  }
+  const asked: string[] = [];
+  page.on("request", (request) =>
+    asked.push(new URL(request.url()).pathname + new URL(request.url()).search),
+  );
+  await page.reload();
+  const cards = page.getByRole("article");
+  await expect(cards).toHaveCount(60);
+  const more = page.getByRole("button", { name: /^More graphs \(60 of \d+\)$/ });
+  await page.getByRole("textbox", { name: "Search graphs" }).fill("many 3");
+  await expect(cards).toHaveCount(16); // both words stand in them: 3, 13, 30 …
+  await expect(page.getByRole("heading", { name: "many 3", exact: true })).toBeVisible();
+  await expect(more).toHaveCount(0);
+  await page.getByRole("textbox", { name: "Search graphs" }).fill("");
+  await expect(cards).toHaveCount(60);
+  await more.focus();
+  await page.keyboard.press("Enter");
+  await expect(page.getByRole("heading", { name: "many 0", exact: true })).toHaveCount(1);
+  await page.getByRole("combobox", { name: "Sort by" }).selectOption("Name");
+  const manyNames = async () => {
+    const names = await cards.getByRole("heading").allTextContents();
+    return names.filter((name) => /^many \d+$/.test(name)).slice(0, 11);
+  };
+  await expect.poll(manyNames).toEqual(Array.from({ length: 11 }, (_, n) => `many ${n}`));
+  expect(asked).not.toContain("/api/graphs");
+  expect(failures).toEqual([]);
+  await context.close();
+});

@@ -370,7 +370,7 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "find/find-bar.tsx FindBar": "a search",
   "levels/sub-graph-dialogs.tsx ExtractForm": DIALOG,
   "levels/flat-dialog.tsx FlatForm": DIALOG,
-  "home/graph-cards.tsx GraphCards": "a search",
+  "home/graph-list.tsx Tools": "a search",
   "home/folder-dialogs.tsx FolderName": DIALOG,
   "home/folder-dialogs.tsx MoveChoice": DIALOG,
   "home/rename-dialog.tsx Rename": DIALOG,

@@ -5,7 +5,7 @@ import { notifications } from "@mantine/notifications";
 import { IconDownload, IconFileSearch, IconSearch } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { useGraphs } from "../api/graphs";
+import { useGraphNames } from "../api/graph-list";
 import { useLive } from "../api/page-link";
 import { currentName, useKnownPeople, useMay, usePerson } from "../api/people";
 import { Empty } from "../ui/empty";
@@ -194,7 +194,7 @@ function Filters({ filter, onChange }: FiltersProps) {
   useEffect(() => setText(filter.text), [filter.text]);
   const search = useDebouncedCallback((next: string) => onChange({ ...filter, text: next }), 300);
   const people = useKnownPeople(NO_PEOPLE).filter(({ name }) => name !== "");
-  const { data: graphs = [] } = useGraphs();
+  const { data: graphs = [] } = useGraphNames();
   const { engines } = useLive().now;
   return (
     <search className={style.filters} aria-label="Filter the audit">

@@ -1,14 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import {
-  type Folder,
-  folderPath,
-  foldersInOrder,
-  foldersWithin,
-  folderWay,
-  graphsInFolder,
-} from "./folders";
-import type { GraphSummary } from "./graphs";
+import { type Folder, folderPath, foldersInOrder, foldersWithin, folderWay } from "./folders";
 
 const folder = (id: string, parent?: string): Folder => ({
   id,
@@ -41,21 +33,4 @@ test("of any tree each folder stands once, behind the one around it", () => {
       }
     }),
   );
-});
-
-test("a folder has its own graphs, a search those inside of it too, and none is out of reach", () => {
-  const tree = [folder("lab"), folder("night", "lab")];
-  const graph = (id: string, folder?: string) => ({ id, folder }) as GraphSummary;
-  const filed = [
-    graph("top"),
-    graph("in_lab", "lab"),
-    graph("in_night", "night"),
-    graph("lost", "removed"),
-  ];
-  const inside = (of: string | null, deep: boolean) =>
-    graphsInFolder(filed, tree, of, deep).map(({ id }) => id);
-  expect(inside(null, false)).toEqual(["top", "lost"]);
-  expect(inside(null, true)).toEqual(["top", "in_lab", "in_night", "lost"]);
-  expect(inside("lab", false)).toEqual(["in_lab"]);
-  expect(inside("lab", true)).toEqual(["in_lab", "in_night"]);
 });

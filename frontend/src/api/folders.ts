@@ -75,21 +75,3 @@ export function folderPath(folders: readonly Folder[], id: string | null | undef
     .map(({ name }) => name)
     .join(" / ");
 }
-
-/**
- * Return the graphs in a folder (null: in none); `deep`: and those in all folders inside of it. The
- * place of a graph whose folder is not known counts as none, so that no graph is out of reach.
- */
-export function graphsInFolder(
-  graphs: readonly GraphSummary[],
-  folders: readonly Folder[],
-  folder: string | null,
-  deep: boolean,
-): readonly GraphSummary[] {
-  if (deep && folder === null) return graphs;
-  return graphs.filter((graph) => {
-    const way = folderWay(folders, graph.folder);
-    if (deep) return way.some(({ id }) => id === folder);
-    return (way.at(-1)?.id ?? null) === folder;
-  });
-}

@@ -21,6 +21,9 @@ const inGraph = (id: string) => ({ graph_id: id });
 
 export const queryKeys = {
   graphs: ["graphs"] as const,
+  pages: ["graph pages"] as const,
+  names: ["graph names"] as const,
+  labels: ["graph labels"] as const,
   deleted: ["deleted graphs"] as const,
   folders: ["folders"] as const,
   actions: ["actions"] as const,
@@ -152,6 +155,9 @@ export function versionName(versions: readonly Version[] | undefined, id: string
 export async function refreshGraphs(client: QueryClient): Promise<void> {
   await Promise.all([
     client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true }),
+    client.invalidateQueries({ queryKey: queryKeys.pages }),
+    client.invalidateQueries({ queryKey: queryKeys.names }),
+    client.invalidateQueries({ queryKey: queryKeys.labels }),
     client.invalidateQueries({ queryKey: queryKeys.deleted }),
     client.invalidateQueries({ queryKey: queryKeys.folders }),
   ]);

@@ -5,14 +5,8 @@ import { IconCopyPlus, IconRestore } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
-import {
-  authorName,
-  copyMoment,
-  type GraphSummary,
-  queryKeys,
-  refreshGraphs,
-  type Version,
-} from "../api/graphs";
+import { fetchGraphNames } from "../api/graph-list";
+import { authorName, copyMoment, refreshGraphs, type Version } from "../api/graphs";
 import { type HistoryEntry, refreshHistory, restoreMoment, revertEdits } from "../api/history";
 import { errorText } from "../api/http";
 import { pageUrl } from "../api/page-url";
@@ -123,7 +117,7 @@ export function useCopyAsGraph() {
   const copy = async (at: number, called: string) => {
     setBusy(true);
     try {
-      const known = client.getQueryData<GraphSummary[]>(queryKeys.graphs) ?? [];
+      const known = await fetchGraphNames(client);
       const name = copyNameOf(
         graph.name,
         called,

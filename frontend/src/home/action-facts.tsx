@@ -2,13 +2,13 @@
 import { Menu } from "@mantine/core";
 import type { ReactElement } from "react";
 import { Link } from "wouter";
-import { useGraphs } from "../api/graphs";
+import { useGraphNames } from "../api/graph-list";
 import { useOpening } from "../ui/late-opening";
 import type { KnownAction } from "./known-actions";
 import style from "./sidebar.module.css";
 
 export function ActionFacts({ button, known }: { button: ReactElement; known: KnownAction }) {
-  const graphs = useGraphs().data ?? [];
+  const graphs = useGraphNames().data ?? [];
   const [opened, setOpened] = useOpening();
   const { template, usedIn, takes, gives } = known;
   return (

@@ -13,11 +13,11 @@ import {
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
 import { type ComponentProps, useState } from "react";
 import { fileGraph } from "../api/folders";
+import { fetchGraphNames } from "../api/graph-list";
 import {
   deleteGraph,
   duplicateGraph,
   type GraphSummary,
-  queryKeys,
   recoverGraph,
   refreshGraphs,
   renameGraph,
@@ -86,7 +86,7 @@ const RenamedUses = lazyPart(() =>
 
 type Renamed = Pick<ComponentProps<typeof RenamedUses>, "before" | "name" | "uses">;
 
-export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
+export function GraphMenu({ graph }: { graph: GraphSummary }) {
   const client = useQueryClient();
   const mayEdit = useMay("edit");
   const mayShare = useMay("share");
@@ -95,12 +95,12 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
   const [moving, setMoving] = useState<boolean | null>(null);
   const [renamed, setRenamed] = useState<Renamed | null>(null);
   const rename = async (name: string) => {
-    const graphs = client.getQueryData<GraphSummary[]>(queryKeys.graphs) ?? [];
-    const named = new Map(graphs.map((each) => [each.id, each.name]));
-    // Where several graphs have the name it may stand for another of them: the check tells that.
-    const isOnly = graphs.filter((each) => each.name === graph.name).length === 1;
     let uses: Renamed["uses"] = [];
     const done = await attempt(client, "Not renamed", async () => {
+      const graphs = await fetchGraphNames(client);
+      const named = new Map(graphs.map((each) => [each.id, each.name]));
+      // Where several graphs have the name it may stand for another of them: the check tells that.
+      const isOnly = graphs.filter((each) => each.name === graph.name).length === 1;
       const ids = isOnly ? usedIn(await fetchLibrary(), graph) : [];
       uses = ids.map((id) => ({ id, name: named.get(id) ?? "" }));
       await renameGraph(graph.id, name);
@@ -109,7 +109,10 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
     return done;
   };
   const duplicate = () =>
-    attempt(client, "Not duplicated", () => duplicateGraph(graph, copyName(graph.name, names)));
+    attempt(client, "Not duplicated", async () => {
+      const names = (await fetchGraphNames(client)).map((each) => each.name);
+      await duplicateGraph(graph, copyName(graph.name, names));
+    });
   const remove = async () => {
     const done = await attempt(client, "Not deleted", () => deleteGraph(graph.id));
     if (done) offerBack(client, graph);

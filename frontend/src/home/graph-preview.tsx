@@ -1,6 +1,6 @@
 /** A graph in miniature: cards as blocks, arrows as lines in the colours of their outcomes. */
 import { useQuery } from "@tanstack/react-query";
-import { useMemo } from "react";
+import { useEffect, useMemo, useRef, useState } from "react";
 import { graphText } from "../api/graphs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { arrange } from "../canvas/geometry/arrange";
@@ -8,6 +8,7 @@ import { outcomeColor } from "../canvas/outcome";
 import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../graph/model";
 import { colorOfName } from "../ui/name-colors";
 
+const NEAR = "200px 0px";
 const MARGIN = 26;
 const CARD = { width: 150, height: 84 } as const;
 const PILL = { width: 44, height: 44 } as const;
@@ -112,13 +113,28 @@ function Miniature({ graph }: { graph: Graph }) {
   );
 }
 
+/** Reads a graph once it comes near the screen: of a long list that are the first few. */
 export function GraphPreview({ graph, seq }: { graph: string; seq: number }) {
+  const frame = useRef<HTMLDivElement>(null);
+  const [isNear, setNear] = useState(false);
+  useEffect(() => {
+    const near = new IntersectionObserver(([each]) => each?.isIntersecting && setNear(true), {
+      rootMargin: NEAR,
+    });
+    if (frame.current) near.observe(frame.current);
+    return () => near.disconnect();
+  }, []);
   const umrf = useQuery({
+    enabled: isNear,
     queryKey: ["graphs", graph, "umrf", seq],
     queryFn: () => graphText(graph).then((text) => JSON.parse(text) as unknown),
     staleTime: Number.POSITIVE_INFINITY,
     retry: false,
   });
   const drawn = useMemo(() => (umrf.data === undefined ? null : fromUmrf(umrf.data)), [umrf.data]);
-  return drawn === null || drawn.actions.length === 0 ? null : <Miniature graph={drawn} />;
+  return (
+    <div ref={frame} className="block h-full">
+      {drawn !== null && drawn.actions.length > 0 && <Miniature graph={drawn} />}
+    </div>
+  );
 }

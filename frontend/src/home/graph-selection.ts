@@ -1,5 +1,5 @@
-/** Filters and sorts lists of graphs. Pure. */
-import type { GraphSummary } from "../api/graphs";
+/** What of the list of graphs is wanted, as the server is asked for it. Pure. */
+import type { GraphsWanted } from "../api/graph-list";
 import { hasEnded } from "../api/run-stop";
 import type { Run } from "../api/runs";
 
@@ -19,6 +19,8 @@ export interface GraphFilter {
   readonly order: GraphOrder;
 }
 
+const FIRST = 200; // that one request may name
+
 /** The newest run of each graph, by the graph's id. */
 export function lastRuns(runs: readonly Run[]): Map<string, Run> {
   const newest = new Map<string, Run>();
@@ -36,45 +38,26 @@ export function matchesSearch(search: string, ...texts: readonly (string | undef
   return words.every((word) => all.includes(word));
 }
 
-function says({ name, description, robots, labels, people }: GraphSummary): string {
-  const names = people?.map((person) => person.name);
-  return [name, description, robots, labels, names].flat().join(" ");
+/** The graphs that run come first, then those that ran last. */
+function lastRunFirst(runs: ReadonlyMap<string, Run>): string[] {
+  const ran = (run: Run) => (hasEnded(run) ? run.requested_at : `9${run.requested_at}`);
+  return [...runs]
+    .sort(([, a], [, b]) => ran(b).localeCompare(ran(a)))
+    .slice(0, FIRST)
+    .map(([graph]) => graph);
 }
 
-export function allLabels(graphs: readonly GraphSummary[]): string[] {
-  return [...new Set(graphs.flatMap(({ labels }) => labels ?? []))].sort((a, b) =>
-    a.localeCompare(b),
-  );
-}
-
-export function selectGraphs(
-  graphs: readonly GraphSummary[],
+/**
+ * Return what the list asks the server for, in a folder (null: in none). A search and a label also
+ * find what lies in the folders inside of it. `runs`: the newest one of each graph, which only the
+ * runner knows.
+ */
+export function graphsWanted(
   { search, label, order }: GraphFilter,
+  folder: string | null,
   runs: ReadonlyMap<string, Run>,
-): GraphSummary[] {
-  const ran = ({ id }: GraphSummary): string => {
-    const run = runs.get(id);
-    if (run === undefined) return "";
-    return hasEnded(run) ? run.requested_at : `9${run.requested_at}`;
-  };
-  // What is wrong comes before what is to fill in, and both before what may go wrong.
-  const worst = ({ wrong = 0, to_fill_in = 0, problems }: GraphSummary) => [
-    wrong,
-    to_fill_in,
-    problems?.error ?? 0,
-    problems?.warning ?? 0,
-  ];
-  const worse = (a: readonly number[], b: readonly number[]) =>
-    b.map((count, i) => count - (a[i] ?? 0)).find((more) => more !== 0) ?? 0;
-  const by: Record<GraphOrder, (a: GraphSummary, b: GraphSummary) => number> = {
-    changed: () => 0,
-    run: (a, b) => ran(b).localeCompare(ran(a)),
-    name: (a, b) => a.name.localeCompare(b.name, undefined, { numeric: true }),
-    problems: (a, b) => worse(worst(a), worst(b)),
-    size: (a, b) => (b.actions ?? 0) - (a.actions ?? 0),
-  };
-  return graphs
-    .filter((graph) => label === null || graph.labels?.includes(label))
-    .filter((graph) => matchesSearch(search, says(graph)))
-    .sort((a, b) => by[order](a, b) || b.updated_at.localeCompare(a.updated_at));
+): GraphsWanted {
+  const sorted = order === "run" ? { first: lastRunFirst(runs) } : { sort: order };
+  const deep = search.trim() !== "" || label !== null;
+  return { search, label, folder: folder ?? "", deep, ...sorted };
 }

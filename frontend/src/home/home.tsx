@@ -1,15 +1,13 @@
 /** The first page: every graph by folders, and how to begin. */
-import { Button, Skeleton } from "@mantine/core";
-import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
+import { Button } from "@mantine/core";
+import { IconFileImport, IconPlus } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { useSearch } from "wouter";
 import { folderWay, useFolders } from "../api/folders";
-import { useGraphs } from "../api/graphs";
-import { errorText } from "../api/http";
 import { useMay } from "../api/people";
 import { Empty } from "../ui/empty";
 import { boundedPart } from "../ui/lazy-part";
-import { GraphCards } from "./graph-cards";
+import { GraphList } from "./graph-list";
 import style from "./home.module.css";
 
 const DeletedGraphs = boundedPart(
@@ -33,27 +31,29 @@ interface Props {
   greeting?: ReactNode;
 }
 
-function Skeletons() {
+function NoGraphs({ onNew }: Pick<Props, "onNew">) {
+  const mayEdit = useMay("edit");
   return (
-    <div className={style.cards} aria-hidden>
-      {[0, 1, 2, 3].map((i) => (
-        <div className={style.card} key={i}>
-          <div className={style.preview} />
-          <div className={style.body}>
-            <Skeleton height={12} width="50%" mb={10} />
-            <Skeleton height={9} width="90%" mb={8} />
-            <Skeleton height={9} width="40%" />
-          </div>
-        </div>
-      ))}
-    </div>
+    <Empty
+      icon={<IconPlus size={22} />}
+      title="No graph yet"
+      action={
+        mayEdit && (
+          <Button variant="filled" onClick={onNew}>
+            New graph
+          </Button>
+        )
+      }
+    >
+      {mayEdit
+        ? "Begin with an empty one, or drop a UMRF file anywhere on this page."
+        : "Graphs of others appear here."}
+    </Empty>
   );
 }
 
 export function Home({ onNew, onImport, kept, greeting }: Props) {
   const mayEdit = useMay("edit");
-  const graphs = useGraphs();
-  const list = graphs.data ?? [];
   const known = useFolders();
   const folders = known.data ?? [];
   const asked = new URLSearchParams(useSearch()).get("folder");
@@ -86,52 +86,23 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
           )}
         </div>
         {greeting}
-        {graphs.isPending && <Skeletons />}
-        {graphs.isError && (
-          <>
-            <Empty
-              icon={<IconAlertTriangle size={22} />}
-              title={
-                graphs.data === undefined
-                  ? "The list cannot be read"
-                  : "The list below may be out of date"
-              }
-            >
-              {errorText(graphs.error)}
-            </Empty>
-            {kept}
-          </>
-        )}
         {asked !== null && known.isSuccess && folder === null && (
           <p role="status">This folder is not there any more. Its graphs are where it was.</p>
         )}
-        {graphs.data !== undefined && list.length === 0 && folders.length === 0 && (
-          <Empty
-            icon={<IconPlus size={22} />}
-            title="No graph yet"
-            action={
-              mayEdit && (
-                <Button variant="filled" onClick={onNew}>
-                  New graph
-                </Button>
-              )
-            }
+        {(asked === null || !known.isPending) && (
+          <GraphList
+            key={folder}
+            folders={folders}
+            folder={folder}
+            none={known.isSuccess && <NoGraphs onNew={onNew} />}
+            kept={kept}
           >
-            {mayEdit
-              ? "Begin with an empty one, or drop a UMRF file anywhere on this page."
-              : "Graphs of others appear here."}
-          </Empty>
-        )}
-        {graphs.data !== undefined && list.length + folders.length > 0 && (
-          <GraphCards key={folder} graphs={list} folders={folders} folder={folder}>
             <FolderCards folder={folder} folders={folders} />
-          </GraphCards>
+          </GraphList>
         )}
-        {graphs.data !== undefined && (
-          <div className={style.foot}>
-            <DeletedGraphs />
-          </div>
-        )}
+        <div className={style.foot}>
+          <DeletedGraphs />
+        </div>
       </div>
     </main>
   );

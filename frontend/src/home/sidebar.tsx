@@ -1,21 +1,24 @@
 /** The list on the left: graphs to open, or actions to place. */
 import { ActionIcon, Kbd, TextInput } from "@mantine/core";
+import { useDebouncedValue } from "@mantine/hooks";
 import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "wouter";
-import { useGraphs } from "../api/graphs";
+import { useGraphPages } from "../api/graph-list";
 import { useMay } from "../api/people";
 import type { NewAction } from "../graph/edit";
 import { useListTab } from "../ui/hooks";
 import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { Tooltip } from "../ui/tooltip";
 import { GraphRow, RowSkeletons } from "./graph-rows";
-import { matchesSearch } from "./graph-selection";
+import { MoreGraphs } from "./more-graphs";
 import style from "./sidebar.module.css";
 
 const PlaceableActions = lazyPart(() =>
   import("./placeable-actions").then((part) => part.PlaceableActions),
 );
+
+const PAUSE = 150; // ms without a key before a search is asked
 
 interface Props {
   current?: string;
@@ -42,26 +45,20 @@ function Tools({ onNew, onImport }: Pick<Props, "onNew" | "onImport">) {
   );
 }
 
-function GraphList({ search, current }: { search: string; current: string | undefined }) {
-  const graphs = useGraphs();
-  const shown = (graphs.data ?? []).filter((graph) =>
-    matchesSearch(
-      search,
-      graph.name,
-      graph.description,
-      ...(graph.robots ?? []),
-      ...(graph.labels ?? []),
-    ),
-  );
+function GraphList({ typed, current }: { typed: string; current: string | undefined }) {
+  const [search] = useDebouncedValue(typed, PAUSE);
+  const pages = useGraphPages({ search });
+  const { graphs } = pages;
   return (
     <>
-      {graphs.isPending && <RowSkeletons count={4} />}
+      {graphs === undefined && <RowSkeletons count={4} />}
       <nav aria-label="Graphs">
-        {shown.map((graph) => (
+        {graphs?.map((graph) => (
           <GraphRow key={graph.id} graph={graph} current={graph.id === current} />
         ))}
       </nav>
-      {graphs.isSuccess && shown.length === 0 && (
+      <MoreGraphs pages={pages} />
+      {graphs?.length === 0 && (
         <p className={style.hint}>{search === "" ? "No graph yet." : "No graph has this name."}</p>
       )}
     </>
@@ -93,7 +90,7 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
       </div>
       <div className={style.scroll}>
         {tab === "graphs" ? (
-          <GraphList search={search} current={current} />
+          <GraphList typed={search} current={current} />
         ) : (
           <PartBoundary waiting={<RowSkeletons count={4} />}>
             {onPlace && <PlaceableActions search={search} current={current} onPlace={onPlace} />}

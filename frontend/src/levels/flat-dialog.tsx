@@ -7,7 +7,8 @@ import { Button, Group, Modal, Skeleton, TextInput } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { type GraphSummary, queryKeys, refreshGraphs } from "../api/graphs";
+import { useGraphNames } from "../api/graph-list";
+import { refreshGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import { type FlatGraph, type FlatteningReason, makeFlatGraph, useFlatGraph } from "../api/inside";
 import type { EditorContext } from "../edit-actions/editor-context";
@@ -68,11 +69,9 @@ function FlatForm({ flat, context, onClose }: Props & { flat: FlatGraph }) {
   const [, go] = useLocation();
   const [wrong, setWrong] = useState("");
   const [busy, setBusy] = useState(false);
-  const [name, setName] = useState(() => {
-    const known = client.getQueryData<GraphSummary[]>(queryKeys.graphs) ?? [];
-    const taken = known.map((each) => each.name);
-    return copyNameOf(context.graph.name, "flat", taken);
-  });
+  const [typed, setName] = useState<string | null>(null);
+  const taken = useGraphNames().data?.map((each) => each.name) ?? [];
+  const name = typed ?? copyNameOf(context.graph.name, "flat", taken);
   const make = async () => {
     setBusy(true);
     try {

@@ -3,7 +3,8 @@
 import { keepPreviousData, useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { editor } from "../api/client";
-import { queryKeys, useGraphs } from "../api/graphs";
+import { useSomeGraphs } from "../api/graph-list";
+import { queryKeys } from "../api/graphs";
 import { errorText } from "../api/http";
 import type { LevelGraph } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
@@ -89,7 +90,7 @@ const read = (umrf: unknown): Graph => fromUmrf(umrf);
  * graphs keep their identity.
  */
 export function useLevelGraphs(ids: readonly string[]): ReadonlyMap<string, Graph | string | null> {
-  const { data: graphs } = useGraphs();
+  const { data: graphs } = useSomeGraphs(ids);
   const found = useQueries({
     queries: ids.map((id) => {
       // The list of graphs tells of every change; without it each graph is loaded once.

@@ -3,7 +3,7 @@
 import { Button } from "@mantine/core";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
-import { useGraphs } from "../api/graphs";
+import { useGraphNames } from "../api/graph-list";
 import type { LibraryAction } from "../api/library";
 import type { Parameter } from "../graph/model";
 import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../home/robot-actions";
@@ -80,7 +80,7 @@ interface UsedInProps {
 }
 
 export function UsedIn({ usedIn, differs, onTake }: UsedInProps) {
-  const graphs = useGraphs().data ?? [];
+  const graphs = useGraphNames().data ?? [];
   const nameOf = (id: string) => graphs.find((graph) => graph.id === id)?.name || "Untitled";
   return (
     <section>

@@ -9,7 +9,8 @@ import {
   IconTrash,
 } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
-import { useGraphs, useVersions, versionName } from "../api/graphs";
+import { useGraphNames } from "../api/graph-list";
+import { useVersions, versionName } from "../api/graphs";
 import { CONDUCTED } from "../api/led-runs";
 import { filterOf, NO_FILTER, queryOf, type RunFilter, useLabels } from "../api/review";
 import { keyOf } from "../ui/keys";
@@ -217,7 +218,7 @@ function Person({ filter, onChange }: MoreRunFiltersProps) {
 }
 
 function Fields({ filter, onChange }: MoreRunFiltersProps) {
-  const graphs = useGraphs().data ?? [];
+  const graphs = useGraphNames().data ?? [];
   const versions = useVersions(filter.graph).data ?? [];
   const known = graphs.map(({ id, name }) => ({ value: id, label: name }));
   const strange = filter.graph !== "" && known.every(({ value }) => value !== filter.graph);

@@ -3,13 +3,8 @@ import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
 import { useLocation, useSearch } from "wouter";
-import {
-  createGraph,
-  type GraphSummary,
-  queryKeys,
-  refreshGraphs,
-  refreshLibrary,
-} from "../../api/graphs";
+import { fetchGraphNames } from "../../api/graph-list";
+import { createGraph, refreshGraphs, refreshLibrary } from "../../api/graphs";
 import { errorText } from "../../api/http";
 
 function complain(title: string, error: unknown): void {
@@ -48,7 +43,7 @@ export function useNewGraphs(): NewGraphs {
   const folder = path === "/" ? new URLSearchParams(search).get("folder") : null;
   const create = useCallback(async () => {
     try {
-      const known = client.getQueryData<readonly GraphSummary[]>(queryKeys.graphs) ?? [];
+      const known = await fetchGraphNames(client);
       const graph = await createGraph(freshName(known.map(({ name }) => name)), folder);
       void refreshGraphs(client);
       go(`/graphs/${graph.id}`);
