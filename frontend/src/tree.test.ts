@@ -387,6 +387,8 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "robots/robot-form.tsx Profile": "a part of RobotForm, which holds all of the robot as a draft",
   "robots/robot-form.tsx Reach": "a part of RobotForm, which holds all of the robot as a draft",
   "runs/start/start-dialog.tsx Choice": "no text: a robot that is ticked",
+  "status/start-values-form.tsx Input":
+    "values of a start: its dialog says which are sent, and the next one begins with these",
   "ui/pick-list.tsx PickList": "a search",
 };
 

@@ -178,6 +178,11 @@ export function errorPlace(error: unknown): string {
   return error.message.includes(words) ? "" : words;
 }
 
+/** Return the JSON pointer in the body of a request at which a refusal points; "" if at none. */
+export function pathRefused(error: unknown): string {
+  return error instanceof Refusal ? (error.details.where?.path ?? "") : "";
+}
+
 function placeInFile(error: Refusal): string {
   const where = error.details.where;
   if (where?.line !== undefined) {

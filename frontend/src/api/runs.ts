@@ -84,6 +84,8 @@ export interface StartOrder {
   drill?: boolean;
   /** Where a led run waits. */
   breakpoints?: readonly RunBreakpoint[];
+  /** Of the inputs for which the graph asks. */
+  values?: NonNullable<Run["values"]>;
 }
 
 /** True for each robot that a person says to watch. */
@@ -130,6 +132,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.watching === undefined ? {} : { watching: order.watching }),
     ...(order.drill === true ? { drill: true } : {}),
     ...asBreakpoints(order.breakpoints),
+    ...(order.values === undefined ? {} : { values: order.values }),
     umrf: order.umrf,
     ...order.inside,
   };

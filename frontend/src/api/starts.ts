@@ -8,6 +8,54 @@ import type { Inside, Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
 export type Approval = RunnerApi["Approval"];
+/** An input for which a start asks. */
+export type AskedInput = RunnerApi["AskedInput"];
+/** Values of a start, by the full name of the action and the flat name of the input. */
+export type StartValues = RunnerApi["ApprovalWanted"]["values"];
+export type StartValue = StartValues[string][string];
+/** A person's question for the yes of others to a start. */
+export type ApprovalWanted = RunnerApi["ApprovalWanted"];
+
+/** Fetch for which inputs a start of a graph asks. */
+export function fetchAskedInputs(
+  runner: string,
+  umrf: string,
+  signal: AbortSignal,
+): Promise<AskedInput[]> {
+  return runnerAt(runner).post("/api/asked_inputs", { body: { umrf }, signal });
+}
+
+/** Values that a graph was started with before. */
+export interface EarlierValues {
+  readonly values: StartValues;
+  /** The number of the run. */
+  readonly run: number;
+}
+
+const LOOKED_THROUGH = 100; // runs of the graph, the newest
+
+/** Fetch the values with which the graph was last started by a person, or else by anybody; null for none. */
+export async function fetchEarlierValues(
+  runner: string,
+  graph: string,
+  person: string,
+  signal: AbortSignal,
+): Promise<EarlierValues | null> {
+  const query = { graph, limit: LOOKED_THROUGH };
+  const runs = await runnerAt(runner).get("/api/runs", { query, signal });
+  const known = runs.filter(({ values }) => values !== undefined);
+  const found = known.find(({ author }) => author.id === person) ?? known[0];
+  return found?.values ? { values: found.values, run: found.number } : null;
+}
+
+/** Fetch for which starts of a graph people asked others for their yes; the newest first. */
+export function fetchWantedApprovals(
+  runner: string,
+  graph: string,
+  signal: AbortSignal,
+): Promise<ApprovalWanted[]> {
+  return runnerAt(runner).get("/api/approvals/asked", { query: { graph }, signal });
+}
 
 /** Fetch the people who approved exactly the graph with this digest. */
 export function fetchApprovals(
@@ -41,7 +89,12 @@ export function runPreflight(
   engines: readonly string[],
   behaviours: boolean,
   led: LedOrder | null,
-  said: { watching: Watching; drill: boolean; breakpoints: readonly RunBreakpoint[] },
+  said: {
+    watching: Watching;
+    drill: boolean;
+    breakpoints: readonly RunBreakpoint[];
+    values: StartValues;
+  },
   signal: AbortSignal,
 ): Promise<Preflight[]> {
   const breakpoints = [...said.breakpoints] as RunnerApi["Breakpoint"][];

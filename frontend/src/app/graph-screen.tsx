@@ -232,15 +232,17 @@ function Draft(props: Settled & Pick<ComponentProps<typeof DraftStatus>, "run" |
 }
 
 function Start({ settle }: Settled) {
-  const { id, graph, seq, obstacle, compact, phone } = useEditorSummary();
+  const { id, graph, seq, obstacle, asks, compact, phone } = useEditorSummary();
   const name = graph.name || "untitled";
-  return <StartControl {...{ graph: id, name, seq, settle, obstacle, compact, thumb: phone }} />;
+  const more = { asks: asks !== "", compact, thumb: phone };
+  return <StartControl {...{ graph: id, name, seq, settle, obstacle, ...more }} />;
 }
 
 /** Records the open dry-run as a run, by the decisions that were made in it. */
 function Record() {
-  const { id, seq, obstacle, dryRun } = useEditorSummary();
+  const { id, seq, asks, obstacle: other, dryRun } = useEditorSummary();
   if (dryRun === null) return null;
+  const obstacle = other ?? (asks === "needs" ? "to fill in" : null);
   const { decided, close } = dryRun;
   return (
     <RecordDryRun {...{ graph: id, seq, obstacle, script: scriptOf(decided), onStarted: close }} />

@@ -173,6 +173,8 @@ interface EditorSummary {
   seq: number;
   /** The reason why this moment cannot be started; null if it can. */
   obstacle: string | null;
+  /** A start asks for values: `needs` those without which it cannot be; else it has them. */
+  asks: "" | "may" | "needs";
   selected: string | null;
   pick: (aid: string) => void;
   /** Adds an action where there is room. */
@@ -258,6 +260,11 @@ function useSummary(
     place,
     seq: link.seq,
     obstacle: obstacleOf(context, link, checked, placing),
+    asks: checked.told.some(({ isAsked }) => isAsked)
+      ? "needs"
+      : context.graph.actions.some((action) => action.asks)
+        ? "may"
+        : "",
     onPlacing: setPlacing,
     selected,
     pick: (aid) => {

@@ -29,7 +29,7 @@ export const SILENT_FIELDS: ReadonlySet<string> = new Set([
 export function fieldWords(field: string): string {
   if (field.startsWith("in/")) return `input ${pathWords(field.slice(3))}`;
   if (field.startsWith("out/")) return `output ${pathWords(field.slice(4))}`;
-  if (field.startsWith("ask/")) return `asked at the start: ${pathWords(field.slice(4))}`;
+  if (field.startsWith("ask/")) return `asking for ${pathWords(field.slice(4))}`;
   if (field.startsWith("remap/")) return `remap of ${field.slice(6)}`;
   if (field.startsWith("waypoints/")) return "bends";
   return WORDS[field] ?? field.replace(/^x\//, "").replaceAll("_", " ");

@@ -27,7 +27,13 @@ import { clock, day, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import style from "./compare-page.module.css";
 import { ComparedCanvas, Legend } from "./compared-cards";
-import { causeSentence, differencesOf, outermostAid, sameAsSeen } from "./differences";
+import {
+  causeSentence,
+  differencesOf,
+  outermostAid,
+  sameAsSeen,
+  valueDifferences,
+} from "./differences";
 import { GhostLanes } from "./ghost-lanes";
 import type { RunBarParts } from "./run-page";
 
@@ -97,6 +103,7 @@ function Before({ found }: { found: Comparison }) {
         </p>
       )}
       <GraphChanges found={found} />
+      <ValueChanges found={found} />
     </section>
   );
 }
@@ -267,8 +274,8 @@ export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode })
 
 function GraphChanges({ found }: { found: Comparison }) {
   const { subgraphs } = found;
-  const same =
-    subgraphs.length === 0 ? "Both ran exactly the same graph." : "The graph was the same.";
+  const isExact = subgraphs.length === 0 && valueDifferences(found).length === 0;
+  const same = isExact ? "Both ran exactly the same graph." : "The graph was the same.";
   return (
     <>
       {subgraphs.length > 0 && (
@@ -281,6 +288,27 @@ function GraphChanges({ found }: { found: Comparison }) {
       ) : (
         <DifferenceView found={found.graph} label="What changed in the graph" />
       )}
+    </>
+  );
+}
+
+function ValueChanges({ found }: { found: Comparison }) {
+  const all = valueDifferences(found);
+  if (all.length === 0) return null;
+  return (
+    <>
+      <p className={style.same}>They were started with different values:</p>
+      <ul className="list-reset stack gap-50" aria-label="Different values">
+        {all.map(({ place, words, a, b }) => (
+          <li key={place} className="text-12 break-anywhere">
+            <b>
+              <bdi>{words}</bdi>
+            </b>
+            : <bdi>{a ?? "as in the graph"}</bdi> in run {found.a.number},{" "}
+            <bdi>{b ?? "as in the graph"}</bdi> in run {found.b.number}
+          </li>
+        ))}
+      </ul>
     </>
   );
 }

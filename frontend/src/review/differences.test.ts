@@ -10,6 +10,7 @@ import {
   outermostAid,
   overlap,
   sameAsSeen,
+  valueDifferences,
 } from "./differences";
 
 const iso = (s: number) => new Date(s * 1000).toISOString();
@@ -194,4 +195,13 @@ test("what is inside of an action stands below it, and what differs there is tol
   expect(differencesOf(found)[0]?.title).toBe("Fetch 0 › Grip 0 ended with an error");
   expect(likelyCause(found)).toBe("the graph inside Fetch 0 was another one");
   expect(outermostAid(found, grip)).toBe("Fetch_0");
+});
+
+test("values with which only one of two runs was started are differences, and equal ones are none", () => {
+  const [a, b] = [{ Go_0: { place: "x", torque: 5 } }, { Go_0: { place: "x" }, Look_1: { at: 2 } }];
+  const found = valueDifferences({ a: { values: a }, b: { values: b } } as unknown as Comparison);
+  expect(found.map(({ words, a, b }) => [words, a, b])).toEqual([
+    ["Go torque", "5", null],
+    ["Look 1 at", null, "2"],
+  ]);
 });

@@ -10,6 +10,7 @@ import { plainValue } from "../differences/difference-words";
 import { boundsText } from "../status/durations";
 import { INTO, spaced, wayWords } from "../status/level-places";
 import { visitDuration } from "../status/progress";
+import { valueLines } from "../status/value-words";
 import { isolated } from "../words/isolated";
 
 /** Duration as a range, ms; `most` is Infinity if nothing bounds it. */
@@ -247,4 +248,28 @@ export function causeSentence(found: Comparison): string | null {
   return found.same_graph && found.same_engine && found.subgraphs.length === 0
     ? "Nothing that is known differed before."
     : "Nothing that differed before is known to explain it.";
+}
+
+/** A value of the start of one of two runs that the other does not have. */
+export interface ValueDifference {
+  readonly place: string;
+  readonly words: string;
+  /** JSON text; null: nothing was set. */
+  readonly a: string | null;
+  readonly b: string | null;
+}
+
+/** Return the values with which two runs were started, where they differ. */
+export function valueDifferences({ a, b }: Pick<Comparison, "a" | "b">): ValueDifference[] {
+  const [ofA, ofB] = [a, b].map(
+    ({ values }) => new Map(valueLines(values).map((line) => [line.place, line])),
+  );
+  return [...new Map([...(ofA ?? []), ...(ofB ?? [])])]
+    .map(([place, { action, input }]) => ({
+      place,
+      words: `${action} ${input}`,
+      a: ofA?.get(place)?.text ?? null,
+      b: ofB?.get(place)?.text ?? null,
+    }))
+    .filter((each) => each.a !== each.b);
 }

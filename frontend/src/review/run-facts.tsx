@@ -11,6 +11,7 @@ import { type RunMarks, setMarks, useLabels, useMarks, useRaw } from "../api/rev
 import { type Run, requesterPlace, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { runEndText } from "../status/progress";
+import { valuesWords } from "../status/value-words";
 import { useDraft } from "../ui/drafts";
 import { clock, day, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -42,6 +43,8 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ["Graph", run.graph_name],
     ["Version", version],
     ["Digest", run.digest],
+    ...(run.values ? [["Started with", valuesWords(run.values)] as [string, string]] : []),
+    ...(run.sent_digest ? [["Digest with that", run.sent_digest] as [string, string]] : []),
     ["Engine", runPlace(run)],
     ["Started by", `${by}${requesterPlace(run.author)}`],
     ...(run.batons
@@ -94,7 +97,7 @@ export function RunFacts({ runner, run, version, by }: Props) {
       {rows.map(([name, value]) => (
         <div key={`${name} ${value}`}>
           <dt className="ink2">{name}</dt>
-          <dd className={name === "Digest" ? "text-11_5 mono" : undefined}>{value}</dd>
+          <dd className={name.startsWith("Digest") ? "text-11_5 mono" : undefined}>{value}</dd>
         </div>
       ))}
     </dl>

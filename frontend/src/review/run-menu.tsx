@@ -33,6 +33,7 @@ export interface RepeatActions {
   engines: readonly string[];
   /** The engine of each actor; of a led run. */
   robots?: Run["robots"];
+  values?: Run["values"] | undefined;
 }
 
 interface Props {
@@ -153,7 +154,7 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
     if (runner !== undefined) repeatRun(runner, run, which).then(show, complain);
   };
   const start = (seq: number) =>
-    onStart({ graph, name: run.graph_name, seq, engines, robots: run.robots });
+    onStart({ graph, name: run.graph_name, seq, engines, robots: run.robots, values: run.values });
   const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);
   const close = () => setDialog(null);
   return (
@@ -307,16 +308,38 @@ interface SentGraph {
   digest: string;
   umrf: string;
   inside: Inside;
+  values?: NonNullable<Run["values"]>;
 }
 
-/** The graph as it is now, published as exactly that. */
-async function newestOf(graph: string): Promise<SentGraph> {
-  const { seq } = await graphMoment(graph);
-  const text = await publish(graph, seq);
+/** Read a version as the editor writes it. */
+function readVersion(text: string): SentGraph {
   const version = JSON.parse(text) as Version;
   const umrf = memberText(text, "umrf");
   if (umrf === null) throw new Error("The editor gave no graph with the version.");
   return { version: version.id, digest: version.digest, umrf, inside: insideOf(version) };
+}
+
+/** The graph as it is now, with the values of a run. */
+async function newestOf(graph: string, { values }: Run): Promise<SentGraph> {
+  const { seq } = await graphMoment(graph);
+  const sent = readVersion(await publish(graph, seq));
+  return values === undefined ? sent : { ...sent, values };
+}
+
+/** The graph that is started in the place of that of a run, with its values. */
+async function sentGraph(runner: string, run: Run, which: RepeatedVersion): Promise<SentGraph> {
+  if (which === "newest" && run.graph !== null) return newestOf(run.graph, run);
+  const umrf = await fetchText(umrfUrl(runner, run.id));
+  const inside = insideOf(run.subgraphs === undefined ? await getRun(runner, run.id) : run);
+  if (!run.values) return { version: run.version ?? "", digest: run.digest, umrf, inside };
+  if (run.version) {
+    const text = await fetchText(`/api/versions/${encodeURIComponent(run.version)}`);
+    return { ...readVersion(text), values: run.values };
+  }
+  // Without its version there is only what was sent, which has the values and asks for nothing.
+  const { subgraphs } = inside;
+  const digest = run.sent_digest ?? run.digest;
+  return { version: "", digest, umrf, inside: { ...(subgraphs && { subgraphs }) } };
 }
 
 /** Starts it; whatever was not seen is chosen, and told. */
@@ -326,15 +349,7 @@ async function repeatRun(
   which: RepeatedVersion,
   fault?: Injected,
 ): Promise<Repeated> {
-  const sent: SentGraph =
-    which === "newest" && run.graph !== null
-      ? await newestOf(run.graph)
-      : {
-          version: run.version ?? "",
-          digest: run.digest,
-          umrf: await fetchText(umrfUrl(runner, run.id)),
-          inside: insideOf(run.subgraphs === undefined ? await getRun(runner, run.id) : run),
-        };
+  const sent = await sentGraph(runner, run, which);
   const script =
     which === "newest"
       ? await recordedScriptFor(runner, run.id, sent.umrf, fault)

@@ -7,6 +7,7 @@ import { boundsText, durationText } from "../status/durations";
 import { actionWords } from "../status/level-places";
 import { howWords, progressOf, runEndText, visitDuration } from "../status/progress";
 import { useUnsure } from "../status/silence";
+import { valuesWords } from "../status/value-words";
 import { PrintSheet } from "../ui/print-sheet";
 import { clock, dateText, instant } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -108,6 +109,8 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
       facts={[
         ["Version", version],
         ["Digest", run.digest],
+        ...(run.values ? [["Started with", valuesWords(run.values)] as const] : []),
+        ...(run.sent_digest ? [["Digest with that", run.sent_digest] as const] : []),
         ["Robot", runPlace(run)],
         ["Started by", `${by}${requesterPlace(run.author)}`],
         ["Started", start === null ? "not known to have begun" : moment(start)],

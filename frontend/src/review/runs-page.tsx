@@ -30,6 +30,7 @@ import { type Run, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
+import { valuesWords } from "../status/value-words";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -66,7 +67,7 @@ interface RunRowProps {
   onChoose: (chosen: boolean) => void;
 }
 
-/** Shows what people, and the runner after its end, have noted of a run. */
+/** Shows what people, and the runner after its end, have noted of a run, and what it was started with. */
 function Marks({ run }: { run: ListedRun }) {
   return (
     <>
@@ -76,6 +77,11 @@ function Marks({ run }: { run: ListedRun }) {
           {each}
         </span>
       ))}
+      {run.values && (
+        <span className={style.cause} title={valuesWords(run.values)}>
+          with {valuesWords(run.values)}
+        </span>
+      )}
       {run.cause && <span className={style.cause}>{run.cause}</span>}
     </>
   );

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, TypeAlias
 import msgspec
 
 from action_assistant.safe_text import hold_names
-from action_assistant.umrf.json.text import Json, dump, parse_small
+from action_assistant.umrf.json.text import Json, dump, parse_small, pointer
 from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.model import ENTRY, Action, Graph, JsonText, Key, Parameter, Relation
 from action_assistant.umrf.parameters import NATIVE, fits, flat_name
@@ -54,12 +54,14 @@ class AskedInput(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class WrongValue(ValueError):
-    """A value cannot be given to a graph. `action`, `name`: its place, "" for all inputs of an action."""
+    """A value cannot be given to a graph. `action`, `name`: its place, "" for all inputs of an action;
+    `path`: its JSON pointer in the body of a request."""
 
     def __init__(self, text: str, action: str, name: str = "") -> None:
         super().__init__(text)
         self.action = action
         self.name = name
+        self.path = pointer("values", *(each for each in (action, name) if each))
 
 
 class _Bounds(msgspec.Struct, frozen=True):

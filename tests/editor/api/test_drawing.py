@@ -117,3 +117,18 @@ def test_bad_text_says_where_it_is_wrong(editor: Editor) -> None:
         assert problem["where"]["line"] == 1
         assert_problem(http.post("/api/pieces", content="[1, 2]"), 422)
         assert_problem(http.post("/api/pieces", content="just words"), 400)
+
+
+def test_a_rehearsal_asks_for_values_and_plays_with_those_that_are_given(editor: Editor) -> None:
+    first, *others = NAV["actions"]
+    asking = {**first, "input_parameters": {"place": {"pvf_type": "string"}}}
+    with editor.client() as http:
+        graph = imported(http, actions=[asking, *others])["id"]
+        before = rehearse(http, graph)
+        assert [(each["action"], each["name"]) for each in before["asked"]] == [("Go_0", "place")]
+        assert results(before) == []
+        played = rehearse(http, graph, values={"Go_0": {"place": "here"}})
+        assert results(played) == [("Go_0", "on_true"), ("Back_0", "on_true")]
+        wrong = {"values": {"Go_0": {"place": 5}}}
+        answer = http.post(f"/api/graphs/{graph}/rehearsal", json=wrong)
+        assert (answer.status_code, answer.json()["where"]["path"]) == (400, "/values/Go_0/place")

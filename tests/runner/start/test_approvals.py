@@ -268,3 +268,24 @@ async def test_nobody_approves_or_asks_without_end() -> None:
     await approvals.ask(question(999, "Carol"), ANN)
     await approvals.ask(question(1, "David"), BEN)
     assert await stored() == given + asked + 3
+
+
+@virtual
+async def test_a_question_is_shown_with_its_values_for_a_day() -> None:
+    harness = Harness()
+    now = [1]
+    approvals = Approvals(harness.journal, lambda: now[0])
+    values = {"Go_0": {"place": "valve_8"}}
+    asked = ApprovalQuestion(
+        digest="a" * 64, robots=("David",), graph_name="Fetch", graph="g1", values=values
+    )
+    await approvals.ask(asked, ANN)
+    await approvals.ask(msgspec.structs.replace(asked, digest="b" * 64, values={}), BEN)
+    found = await Approvals(harness.journal, lambda: now[0]).questions_of("g1")
+    assert [(each.author, each.values) for each in found] == [(BEN, {}), (ANN, values)]
+    assert await approvals.questions_of("g2") == ()
+    now[0] += 86_400_000_001
+    assert await approvals.questions_of("g1") == ()
+    large = msgspec.structs.replace(asked, values={"Go_0": {"place": "x" * 70_000}})
+    with pytest.raises(BadInput, match="bytes"):
+        await approvals.ask(large, ANN)

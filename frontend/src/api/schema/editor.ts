@@ -71,6 +71,30 @@ export interface EditorApi {
         note?: string;
     };
     /**
+     * AskedInput
+     * @description An input for which a start asks. `action`, `name`: its full and flat name; `aid`: the key of the
+     *     action; `open`: the graph has no value for it and cannot run without; `value`: the one that it has
+     *     otherwise; `allowed`: the values that it can have, if not all; `least`, `most`: the bounds that its
+     *     author set.
+     */
+    AskedInput: {
+        action: string;
+        name: string;
+        aid: string;
+        type: string;
+        open: boolean;
+        value?: boolean | number | string | (boolean | number | string)[];
+        example?: boolean | number | string | (boolean | number | string)[];
+        /** @default [] */
+        allowed?: (boolean | number | string | (boolean | number | string)[])[];
+        least?: number;
+        most?: number;
+        /** @default  */
+        description?: string;
+        /** @default  */
+        unit?: string;
+    };
+    /**
      * AskedMerge
      * @description The side that the other side's changes are merged into, and, by the place of a conflict, the
      *     side whose value is chosen.
@@ -2061,17 +2085,20 @@ export interface EditorApi {
     };
     /**
      * Rehearsal
-     * @description The events of a simulated run, in order. `cut`: the list is incomplete.
+     * @description The events of a simulated run, in order. `cut`: the list is incomplete; `asked`: the inputs
+     *     for which a start of the graph asks.
      */
     Rehearsal: {
         seq: number;
         trace: (EditorApi["NodeStateEvent"] | EditorApi["GraphStateEvent"] | EditorApi["EdgeEval"] | EditorApi["Dispatch"] | EditorApi["NotReady"] | EditorApi["GraphResultEvent"] | EditorApi["HazardEvent"] | EditorApi["NodeResultEvent"])[];
         cut: boolean;
+        asked: EditorApi["AskedInput"][];
     };
     /**
      * Rehearsing
      * @description A request to simulate the graph after its change `seq` (missing: the newest). `script`: what
-     *     its actions do, as in a script of `simulate`; `commands`: what people do during the run.
+     *     its actions do, as in a script of `simulate`; `commands`: what people do during the run;
+     *     `values`: those of inputs for which a start asks.
      */
     Rehearsing: {
         /** @default null */
@@ -2082,6 +2109,12 @@ export interface EditorApi {
         commands?: EditorApi["Command"][];
         /** @default 3600000 */
         for_ms?: number;
+        /** @default {} */
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
     };
     /**
      * RelationChange

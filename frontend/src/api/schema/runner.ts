@@ -123,7 +123,7 @@ export interface RunnerApi {
     };
     /**
      * ApprovalQuestion
-     * @description The body of a request that asks others for an approval. `robots`: those of the start.
+     * @description The body of a request that asks others for an approval. `robots`, `values`: those of the start.
      */
     ApprovalQuestion: {
         digest: string;
@@ -133,6 +133,12 @@ export interface RunnerApi {
         graph?: string | null;
         /** @default  */
         version?: string;
+        /** @default {} */
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
     };
     /**
      * ApprovalRequest
@@ -146,6 +152,24 @@ export interface RunnerApi {
         version?: string;
         /** @default  */
         note?: string;
+    };
+    /**
+     * ApprovalWanted
+     * @description A person's question for the yes of others to a start: `digest` is that of its whole order,
+     *     `values` are those that it gives the graph.
+     */
+    ApprovalWanted: {
+        digest: string;
+        author: RunnerApi["Author"];
+        /** Format: date-time */
+        at: string;
+        robots: string[];
+        version: string;
+        values: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
     };
     /**
      * ArchiveRequest
@@ -2837,6 +2861,7 @@ export interface RunnerPaths {
         post: RunnerOperations["approve"];
     };
     "/api/approvals/asked": {
+        get: RunnerOperations["listAskedApprovals"];
         post: RunnerOperations["askApproval"];
     };
     "/api/expectations": {
@@ -3772,6 +3797,20 @@ interface RunnerOperations {
             201: {
                 content: {
                     "application/json": RunnerApi["Approval"];
+                };
+            };
+        };
+    };
+    listAskedApprovals: {
+        parameters: {
+            query: {
+                graph: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ApprovalWanted"][];
                 };
             };
         };

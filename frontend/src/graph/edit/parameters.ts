@@ -13,7 +13,6 @@ import {
   rootOf,
 } from "../document-keys";
 import type { JsonText, Key, Parameter } from "../model";
-import type { Bounds } from "../parameters/asked-inputs";
 import { remapFor, type Tie } from "../parameters/output-choices";
 import { asJsonText } from "../values";
 import { asOneEdit, eraseKeys, graphNow, hasAction, writeKey } from "./document-writes";
@@ -92,16 +91,6 @@ export function renameParameter(
       eraseKeys(doc, "actions", askKey(key, path));
     }
     writePaths(doc, key, side, paths);
-  });
-  return true;
-}
-
-/** Sets whether, and within which bounds, a start asks for an input. False when that is gone. */
-export function setAsk(doc: Y.Doc, key: Key, path: string, bounds: Bounds | null): boolean {
-  if (!exists(doc, key, "in", path)) return false;
-  asOneEdit(doc, () => {
-    if (bounds === null) eraseKeys(doc, "actions", askKey(key, path));
-    else writeKey(doc, "actions", askKey(key, path), JSON.stringify(bounds));
   });
   return true;
 }

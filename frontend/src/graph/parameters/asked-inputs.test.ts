@@ -7,11 +7,11 @@ import {
   connect,
   removeParameter,
   renameParameter,
-  setAsk,
   setEntry,
   setParameter,
   undoOf,
 } from "../edit";
+import { setAsk } from "../edit/asks";
 import { askedPaths, askOf } from "./asked-inputs";
 import { withValue } from "./values";
 

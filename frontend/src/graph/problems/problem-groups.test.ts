@@ -56,7 +56,7 @@ test("a pose that is not written is one thing to fill in, and says what of it", 
   expect(told.map(({ kind, message, inputs }) => [kind, message, inputs])).toEqual([
     [
       "fill-in",
-      "at: position.x and position.z still to fill in, or it never runs.",
+      "at: position.x and position.z still to fill in, here or at each start.",
       ["at/position/x", "at/position/z"],
     ],
   ]);

@@ -1,8 +1,8 @@
 /** Groups checked problems for people: one thing is shown once, however many fields it has. Pure. */
 
 import { pathWords } from "../field-words";
-import type { Graph, Key } from "../model";
-import { type DataFlow, dataFlowOf } from "../parameters/data-flow";
+import type { Action, Graph, Key } from "../model";
+import { type DataFlow, dataFlowOf, readValue } from "../parameters/data-flow";
 import { groupOf } from "../parameters/groups";
 import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
 
@@ -21,6 +21,8 @@ export interface ProblemGroup<P extends CheckedProblem = CheckedProblem> {
   readonly group: string | null;
   /** The inputs without a value, by path; they can be filled in where the problem is shown. */
   readonly inputs: readonly string[];
+  /** True if a start asks for these, so that they need not be filled in. */
+  readonly isAsked: boolean;
   /** All checked problems that it stands for, at least one. */
   readonly problems: readonly [P, ...P[]];
 }
@@ -50,8 +52,8 @@ function listed(words: readonly string[]): string {
 }
 
 /** Returns the message about inputs without a value. */
-function unwrittenWords(group: string, paths: readonly string[], code: string): string {
-  const end = code === "H7" ? "or the graph never starts" : "or it never runs";
+function unwrittenWords(group: string, paths: readonly string[], isAsked: boolean): string {
+  const end = isAsked ? "here or at each start" : "or it never runs";
   const what = pathWords(group);
   const parts = paths.map((path) => pathWords(path.slice(group.length + 1)));
   const [only] = paths;
@@ -59,26 +61,30 @@ function unwrittenWords(group: string, paths: readonly string[], code: string): 
   return `${what}: ${listed(parts)} still to fill in, ${end}.`;
 }
 
-function told<P extends CheckedProblem>({
-  id,
-  kind,
-  group,
-  problems,
-}: Gathered<P>): ProblemGroup<P> {
+function told<P extends CheckedProblem>(
+  { id, kind, group, problems }: Gathered<P>,
+  actions: ReadonlyMap<Key, Action>,
+): ProblemGroup<P> {
   const [first] = problems;
   const inputs = group === null ? [] : problems.flatMap((each) => inputOf(each) ?? []);
+  const isAsked = inputs.length > 0 && isAskedFor(actions.get(first.where.aid ?? ""), inputs);
   return {
     id,
     kind,
-    blocks: problems.some(({ severity }) => severity === "error"),
+    blocks: !isAsked && problems.some(({ severity }) => severity === "error"),
     code: first.code,
-    message: group === null ? first.message : unwrittenWords(group, inputs, first.code),
+    message: group === null ? first.message : unwrittenWords(group, inputs, isAsked),
     place: placeOf(first),
     group,
     inputs,
+    isAsked,
     problems,
   };
 }
+
+/** Returns true if a start asks for inputs without a value: for all of a type that people can give. */
+const isAskedFor = (action: Action | undefined, paths: readonly string[]): boolean =>
+  action?.inputs.every((each) => !paths.includes(each.path) || readValue(each).native) ?? false;
 
 /** Returns a function that tells whether every giver of an input brings a value that the input cannot take. */
 function misfitsIn(flow: DataFlow) {
@@ -113,7 +119,7 @@ export function problemGroups<P extends CheckedProblem>(
     else found.set(id, { id, kind, group, problems: [problem] });
   }
   const rank = ({ kind, blocks }: ProblemGroup) => 2 * ORDER[kind] + (blocks ? 0 : 1);
-  return [...found.values()].map(told).sort((a, b) => rank(a) - rank(b));
+  return [...found.values()].map((each) => told(each, actions)).sort((a, b) => rank(a) - rank(b));
 }
 
 /** Returns the other places that have the same problem. */

@@ -25,6 +25,8 @@ interface Props {
   settle: () => Promise<number>;
   /** The reason why this moment cannot be started; null when it can. */
   obstacle: string | null;
+  /** The start asks for values. */
+  asks: boolean;
   compact?: boolean;
   /** In two lines, within reach of a thumb. */
   thumb?: boolean;
@@ -40,7 +42,7 @@ function TwoLines({ first, second }: { first: string; second: string }) {
 }
 
 export function StartControl(props: Props) {
-  const { graph, name, seq, settle, obstacle, compact = false, thumb = false } = props;
+  const { graph, name, seq, settle, obstacle, asks, compact = false, thumb = false } = props;
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
   const start = useStart(graph);
@@ -63,7 +65,7 @@ export function StartControl(props: Props) {
     void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
   return (
     <span className={style.start} data-thumb={thumb || undefined}>
-      {simulated ? (
+      {simulated && !asks ? (
         <HoldButton
           icon={thumb ? undefined : icon}
           label={thumb ? <TwoLines first={words} second="hold · simulator" /> : words}

@@ -1,10 +1,9 @@
 /** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
 import { Button, Checkbox, Modal, Text, Textarea } from "@mantine/core";
-import { IconPlayerPlayFilled, IconRefresh, IconSend, IconUserCheck } from "@tabler/icons-react";
-import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { IconPlayerPlayFilled, IconRefresh, IconUserCheck } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
-import { renewing } from "../../api/client";
 import { identifiedText } from "../../api/courses";
 import { fetchDocument } from "../../api/history";
 import { errorText, unconfirmed } from "../../api/http";
@@ -15,26 +14,23 @@ import { useMay, usePerson } from "../../api/people";
 import { useRight } from "../../api/rights";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run, Watching } from "../../api/runs";
-import {
-  type Approval,
-  approve,
-  askApproval,
-  fetchApprovals,
-  runPreflight,
-} from "../../api/starts";
+import { runPreflight, type StartValues } from "../../api/starts";
 import { type RunBreakpoint, startBreakpoints } from "../../graph/breakpoints";
 import { mapsFrom } from "../../graph/document-keys";
 import { readGraph } from "../../graph/read";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
+import { lineWords, valueLines } from "../../status/value-words";
 import { useWatching, WatchTicks } from "../../status/watching";
 import { HoldButton } from "../../ui/hold-button";
 import { textScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
+import { useAskedValues, ValueList } from "./asked-values";
 import { actorsIn, castObstacle, castOf, LedChoice, movesWords, WayChoice } from "./led-choice";
 import { PreflightList } from "./preflight-list";
+import { SecondPerson } from "./second-person";
 import style from "./start-dialog.module.css";
 import { lastLed, rememberEngines, rememberLed, useStart } from "./use-start";
 
@@ -46,6 +42,8 @@ interface Props {
   chosen: readonly string[];
   /** The engine of each actor, if a led run is started once more. */
   robots?: LedOrder["robots"] | null | undefined;
+  /** Values to begin with: of the run that is started once more. */
+  values?: StartValues | undefined;
   onChosen: (engines: string[]) => void;
   onStarted?: (runs: readonly Run[]) => void;
   onClose: () => void;
@@ -89,7 +87,12 @@ function useLook(
   engines: readonly string[],
   behaviours: boolean,
   led: LedOrder | null,
-  said: { watching: Watching; drill: boolean; breakpoints: readonly RunBreakpoint[] | undefined },
+  said: {
+    watching: Watching;
+    drill: boolean;
+    breakpoints: readonly RunBreakpoint[] | undefined;
+    values: StartValues | null;
+  },
 ) {
   const { runner } = useLive();
   const look = useQuery({
@@ -98,14 +101,15 @@ function useLook(
       const inside = await fetchInside(graph, seq, signal);
       const what = { graph, umrf: umrf ?? "", ...inside };
       const { breakpoints = [] } = said;
-      const all = { ...said, breakpoints };
+      const all = { ...said, breakpoints, values: said.values ?? {} };
       return runPreflight(runner ?? "", what, engines, behaviours, led, all, signal);
     },
     enabled:
       umrf !== undefined &&
       runner !== undefined &&
       engines.length > 0 &&
-      said.breakpoints !== undefined,
+      said.breakpoints !== undefined &&
+      said.values !== null,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,
     staleTime: 0,
@@ -216,6 +220,7 @@ function Exactly({
   digest,
   engines,
   moves,
+  values,
 }: {
   name: string;
   label: string;
@@ -223,6 +228,7 @@ function Exactly({
   engines: readonly string[];
   /** The robots that move in a led run; "" for other starts. */
   moves: string;
+  values: StartValues | null;
 }) {
   return (
     <dl className={style.exactly}>
@@ -240,6 +246,7 @@ function Exactly({
           <dd>{moves}</dd>
         </>
       )}
+      <ValueList values={values} />
     </dl>
   );
 }
@@ -336,9 +343,11 @@ export function StartDialog(props: Props) {
   const mayDrill = !led && engines.length === 1 && !engines.includes(SIMULATOR);
   const [drills, setDrills] = useState(false);
   const breakpoints = way.marks.data;
-  const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints };
+  const given = useAskedValues(graph, way.text.data, props.values, () => setReason(""));
+  const { values } = given;
+  const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints, values };
   const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
-  const error = way.text.error ?? way.marks.error ?? lookError;
+  const error = way.text.error ?? way.marks.error ?? given.error ?? lookError;
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -348,7 +357,7 @@ export function StartDialog(props: Props) {
       ? "The runner does not answer"
       : start.isPending
         ? "Starting …"
-        : (way.missing ?? watch.obstacle ?? obstacleOf(engines, looks, reason));
+        : (way.missing ?? given.obstacle ?? watch.obstacle ?? obstacleOf(engines, looks, reason));
   const choose = (engine: string) => {
     setReason("");
     setDrills(false);
@@ -373,6 +382,7 @@ export function StartDialog(props: Props) {
       behaviours,
       ...said,
       breakpoints: breakpoints ?? [],
+      values: values ?? {},
     };
     // Whoever starts says each time that they watch, and that it is for a drill.
     const onSettled = () => {
@@ -417,6 +427,7 @@ export function StartDialog(props: Props) {
         <Where engines={engines} behaviours={behaviours} onToggle={choose} />
       )}
       {choice}
+      {given.form(lookError)}
       <WatchTicks watch={watch} />
       {asked.length > 0 && (
         <section
@@ -460,7 +471,14 @@ export function StartDialog(props: Props) {
           label="This start is for a Stop drill: I press Stop while it moves"
         />
       )}
-      <SecondPerson key={asked.join("/")} graph={graph} label={label} looks={looks} />
+      <SecondPerson
+        key={asked.join("/")}
+        graph={graph}
+        label={label}
+        looks={looks}
+        values={values ?? {}}
+        taken={given.taken}
+      />
       <ConfirmFirst looks={looks} />
       {codes.length > 0 && !looks?.some(({ never }) => never) && (
         <Textarea
@@ -479,6 +497,7 @@ export function StartDialog(props: Props) {
           digest={digest}
           engines={engines}
           moves={led && way.missing === null ? movesWords(cast) : ""}
+          values={values}
         />
         <HoldButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
@@ -488,13 +507,19 @@ export function StartDialog(props: Props) {
               ? `Start ${label}${how} on ${where.map(isolated).join(", ")}`
               : `Start ${label}: ${why}`
           }
-          question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}?${led ? ` ${movesWords(cast)}` : ""}`}
+          question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(cast)}` : ""}`}
           disabled={why !== null}
           onHeld={begin}
         />
       </footer>
     </Modal>
   );
+}
+
+/** Return the values of a start as the end of a question. */
+function withWords(values: StartValues | null): string {
+  const lines = valueLines(values ?? {}).map((line) => isolated(lineWords(line)));
+  return lines.length === 0 ? "" : `, with ${listed(lines)}`;
 }
 
 const NAMED = 6;
@@ -549,102 +574,4 @@ export function useBehaviours(simulated: boolean): { behaviours: boolean; choice
   const [chosen, choose] = useState(false);
   const choice = simulated ? <BehavioursChoice on={chosen} onChange={choose} /> : null;
   return { behaviours: chosen && simulated, choice };
-}
-
-interface SecondPersonProps {
-  graph: string;
-  label: string;
-  looks: readonly Preflight[] | undefined;
-}
-
-const demands = (looks: SecondPersonProps["looks"]) =>
-  looks?.find(({ items }) => items.some(({ code }) => code === "approved"));
-
-function Said({ given, me, label }: { given: readonly Approval[]; me: string; label: string }) {
-  const others = given.filter(({ author }) => author.id !== me);
-  const mine = others.length < given.length;
-  return (
-    <Text size="sm">
-      {others.length > 0 && (
-        <>
-          Said yes to {isolated(label)}:{" "}
-          <bdi>{others.map(({ author }) => isolated(author.name)).join(", ")}</bdi>.{" "}
-        </>
-      )}
-      {mine && `You said yes to ${isolated(label)}: somebody else may start it.`}{" "}
-      <span className="ink2">
-        A second person needs a browser of their own. Two browsers that opened the same link may
-        belong to one person: the server cannot know that.
-      </span>
-    </Text>
-  );
-}
-
-export function SecondPerson({ graph, label, looks }: SecondPersonProps) {
-  const { runner = "" } = useLive();
-  const { person } = usePerson();
-  const may = useMay("operate");
-  const client = useQueryClient();
-  const digest = demands(looks)?.order_digest ?? "";
-  const key = ["approvals", digest];
-  const given = useQuery({
-    queryKey: key,
-    queryFn: ({ signal }) => fetchApprovals(runner, digest, signal),
-    enabled: digest !== "",
-  });
-  const say = useMutation({
-    mutationFn: () => approve(runner, { digest, graph, version: label, note: "" }),
-    onSettled: renewing(() => client.invalidateQueries({ queryKey: key })),
-  });
-  const robots = (looks ?? [])
-    .filter(({ items }) => items.some(({ code }) => code === "approved"))
-    .map(({ engine }) => engine);
-  const ask = useMutation({
-    mutationFn: () => askApproval(runner, { digest, robots, graph, version: label }),
-  });
-  if (digest === "") return null;
-  const isMissing = given.data?.every(({ author }) => author.id === person.id) ?? false;
-  const mine = given.data?.some(({ author }) => author.id === person.id) ?? true;
-  return (
-    <section className={style.second} aria-label="A second person">
-      <Said given={given.data ?? []} me={person.id} label={label} />
-      {may && !mine && (
-        <Button
-          size="compact-sm"
-          loading={say.isPending}
-          leftSection={<IconUserCheck size={14} aria-hidden />}
-          onClick={() => say.mutate()}
-        >
-          Say yes to {isolated(label)}, for somebody else to start it
-        </Button>
-      )}
-      {may && isMissing && (
-        <Button
-          size="compact-sm"
-          variant="default"
-          loading={ask.isPending}
-          disabled={ask.isSuccess}
-          leftSection={<IconSend size={14} aria-hidden />}
-          onClick={() => ask.mutate()}
-        >
-          Ask others by a message
-        </Button>
-      )}
-      {ask.isSuccess && (
-        <Text size="sm" role="status">
-          {ask.data > 0
-            ? "Others are asked by mail or webhook."
-            : "No receiver of such messages is set here: ask somebody yourself."}
-        </Text>
-      )}
-      {[say.error, ask.error].map(
-        (error) =>
-          error !== null && (
-            <Text key={error.message} size="sm" c="var(--error)" role="alert">
-              {errorText(error)}
-            </Text>
-          ),
-      )}
-    </section>
-  );
 }

@@ -9,6 +9,7 @@ import { insideOf } from "../../api/inside";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Started, type StartOrder, startRun, type Watching } from "../../api/runs";
+import type { StartValues } from "../../api/starts";
 import { serverNow } from "../../clock/server-clock";
 import type { RunBreakpoint } from "../../graph/breakpoints";
 import { newAid } from "../../graph/document-keys";
@@ -37,6 +38,8 @@ export interface StartInput {
   drill?: boolean;
   /** Where a led run waits. */
   breakpoints?: readonly RunBreakpoint[];
+  /** Of the inputs for which the graph asks. */
+  values?: StartValues;
 }
 
 /** A moment as a version, and its graph exactly as the editor wrote it. */
@@ -67,7 +70,7 @@ export function useStart(graph: string) {
     mutationFn: async (wanted: StartInput) => {
       const { seq, engines, led, digest, tree, script, behaviours, override, watching, drill } =
         wanted;
-      const { breakpoints } = wanted;
+      const { breakpoints, values } = wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
@@ -94,6 +97,7 @@ export function useStart(graph: string) {
         ...(watching === undefined ? {} : { watching }),
         ...(drill === undefined ? {} : { drill }),
         ...(breakpoints === undefined ? {} : { breakpoints }),
+        ...(values === undefined ? {} : { values }),
       });
       for (const run of started.runs) live?.learn(run);
       return started;

@@ -17,6 +17,13 @@ from action_assistant.umrf import semantics
 from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.start_values import (
+    AskedInput,
+    StartValues,
+    WrongValue,
+    asked_inputs,
+    with_values,
+)
 
 EVENTS: Final = 4_000  # of one rehearsal; the page shows no more
 HOUR_MS: Final = 3_600_000.0
@@ -32,20 +39,24 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A request to simulate the graph after its change `seq` (missing: the newest). `script`: what
-    its actions do, as in a script of `simulate`; `commands`: what people do during the run."""
+    its actions do, as in a script of `simulate`; `commands`: what people do during the run;
+    `values`: those of inputs for which a start asks."""
 
     seq: int | None = None
     script: Annotated[Any, semantics.SCRIPT] = None
     commands: tuple[Command, ...] = ()
     for_ms: float = HOUR_MS
+    values: StartValues = {}
 
 
 class Rehearsal(msgspec.Struct, frozen=True):
-    """The events of a simulated run, in order. `cut`: the list is incomplete."""
+    """The events of a simulated run, in order. `cut`: the list is incomplete; `asked`: the inputs
+    for which a start of the graph asks."""
 
     seq: int
     trace: tuple[semantics.Trace, ...]
     cut: bool
+    asked: tuple[AskedInput, ...] = ()
 
 
 def rehearsed(sight: GraphAtSeq, wanted: Rehearsing, inside: Inside = NOTHING_INSIDE) -> bytes:
@@ -58,7 +69,16 @@ def rehearsed(sight: GraphAtSeq, wanted: Rehearsing, inside: Inside = NOTHING_IN
     if len(wanted.commands) > 100:
         raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
     graph = read(sight).moment.graph
-    return msgspec.json.encode(_played(sight.seq, graph, graphs_of(inside), script, wanted))
+    filled = _given(graph, wanted.values)
+    found = _played(sight.seq, filled, graphs_of(inside), script, wanted)
+    return msgspec.json.encode(msgspec.structs.replace(found, asked=asked_inputs(graph)))
+
+
+def _given(graph: Graph, values: StartValues) -> Graph:
+    try:
+        return with_values(graph, values)
+    except WrongValue as error:
+        raise BadInput(str(error), where={"path": error.path}) from error
 
 
 def _script(value: Any) -> semantics.Script:

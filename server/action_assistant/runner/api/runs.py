@@ -63,6 +63,7 @@ from action_assistant.runner.start.approvals import (
     ApprovalRequest,
 )
 from action_assistant.umrf.semantics import Script
+from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.audit.events import OwnerDid, StartRefused
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
@@ -475,6 +476,18 @@ class Approval(msgspec.Struct, frozen=True, kw_only=True):
     note: str
 
 
+class ApprovalWanted(msgspec.Struct, frozen=True, kw_only=True):
+    """A person's question for the yes of others to a start: `digest` is that of its whole order,
+    `values` are those that it gives the graph."""
+
+    digest: str
+    author: Author
+    at: datetime
+    robots: tuple[str, ...]
+    version: str
+    values: StartValues
+
+
 class AskedOthers(msgspec.Struct, frozen=True):
     """The number of receivers to which the question is sent."""
 
@@ -526,7 +539,31 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         receivers = services.notifications.receivers
         return AskedOthers(sum("approval.asked" in each.kinds for each in receivers))
 
-    return [approvals, approve, ask]
+    @get(
+        "/api/approvals/asked",
+        summary="For which starts of a graph people asked others for their yes within the last day, the "
+        "newest first",
+        operation_id="listAskedApprovals",
+        guards=[Needs("see")],
+    )
+    async def wanted(
+        request: _Asking, graph: Annotated[str, Parameter(max_length=100)]
+    ) -> list[ApprovalWanted]:
+        services.control.sight.require_graphs(identity_of(request), graph)
+        found = await services.control.approvals.questions_of(graph)
+        return [
+            ApprovalWanted(
+                digest=each.digest,
+                author=each.author,
+                at=views.time(each.at),
+                robots=each.robots,
+                version=each.version,
+                values=each.values,
+            )
+            for each in found
+        ]
+
+    return [approvals, approve, ask, wanted]
 
 
 def _approval(given: ApprovalGiven) -> Approval:

@@ -372,8 +372,7 @@ def _given(graph: Graph, values: StartValues) -> Graph:
     try:
         return with_values(graph, values)
     except WrongValue as why:
-        steps = (each for each in (why.action, why.name) if each)
-        raise BadInput(str(why), where={"path": pointer("values", *steps)}) from why
+        raise BadInput(str(why), where={"path": why.path}) from why
 
 
 def _is_beyond(graph: Graph, values: StartValues) -> bool:

@@ -5,7 +5,7 @@ An approval is a person's word about exactly one graph. It stands in a stream of
 taken back, and says nothing about any other graph.
 """
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from typing import Annotated, ClassVar, Final
 
 import anyio
@@ -19,6 +19,8 @@ from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.start.preflight import Item
 from action_assistant.umrf.facts import SECOND_PERSON
+from action_assistant.umrf.kept_values import as_json
+from action_assistant.umrf.start_values import MOST_BYTES, StartValues
 from action_assistant.web.auth import caller
 
 #: The stream of all approvals.
@@ -29,6 +31,8 @@ _ASKED_US: Final = 600_000_000  # in which one person asks for one graph once
 _GIVEN_AT_ONCE: Final = 60  # approvals of one person
 _ASKED_AT_ONCE: Final = 20  # questions of one person for one robot, about different graphs
 _PER_MINUTE: Final = 1  # of either, after that
+_QUESTIONS: Final = 20  # that are remembered of one graph
+_OPEN_US: Final = 86_400_000_000  # after which a question is no longer shown
 
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -49,8 +53,8 @@ class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
 
 
 class ApprovalAsked(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """The event that a person asks others for an approval of the graph with this digest, for a start
-    on these robots. It lets nobody start anything."""
+    """The event that a person asks others for an approval of the graph or order with this digest, for
+    a start on these robots. `values`: those of the start. It lets nobody start anything."""
 
     kind: ClassVar[str] = "approval.asked.v1"
 
@@ -61,10 +65,11 @@ class ApprovalAsked(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     graph_name: str
     graph: str | None = None
     version: str = ""
+    values: StartValues = {}
 
 
 class ApprovalQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The body of a request that asks others for an approval. `robots`: those of the start."""
+    """The body of a request that asks others for an approval. `robots`, `values`: those of the start."""
 
     digest: Annotated[str, msgspec.Meta(min_length=64, max_length=64)]
     robots: Annotated[
@@ -74,6 +79,7 @@ class ApprovalQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
     graph_name: Annotated[str, msgspec.Meta(max_length=200)]
     graph: Annotated[str, msgspec.Meta(max_length=100)] | None = None
     version: Annotated[str, msgspec.Meta(max_length=100)] = ""
+    values: StartValues = {}
 
 
 class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -94,6 +100,9 @@ class Approvals:
         self._clock_us = clock_us
         self._seq = 0
         self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
+        self._questions: defaultdict[str, deque[ApprovalAsked]] = defaultdict(
+            lambda: deque(maxlen=_QUESTIONS)
+        )
         self._reading = anyio.Lock()
         self._asked: dict[tuple[str, str], ApprovalAsked] = {}
         self._given_pace = TokenBuckets(_GIVEN_AT_ONCE, _PER_MINUTE / 60)
@@ -132,6 +141,9 @@ class Approvals:
         very many graphs, Unavailable if the journal cannot store it."""
         if not _DIGEST.issuperset(question.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
+        if len(as_json(question.values)) > MOST_BYTES:
+            text = f"The values of a start have {MOST_BYTES:,} bytes at most."
+            raise BadInput(text, where={"path": "/values"})
         now = self._clock_us()
         key = author.id, question.digest
         before = self._asked.get(key)
@@ -152,14 +164,28 @@ class Approvals:
 
     async def given_for(self, digest: str) -> tuple[ApprovalGiven, ...]:
         """Return the approvals of a graph, in order of time."""
+        await self._read()
+        return tuple(self._by_digest.get(digest, ()))
+
+    async def questions_of(self, graph: str) -> tuple[ApprovalAsked, ...]:
+        """Return who asked others for an approval of a start of this graph within the last day, and
+        for which start; the newest first."""
+        await self._read()
+        since = self._clock_us() - _OPEN_US
+        return tuple(each for each in reversed(self._questions.get(graph, ())) if each.at >= since)
+
+    async def _read(self) -> None:
         async with self._reading:
             while events := await self._journal.read(STREAM, after=self._seq, limit=500):
                 for event in events:
                     if event.kind == ApprovalGiven.kind:
                         given = msgspec.json.decode(event.body, type=ApprovalGiven)
                         self._by_digest[given.digest].append(given)
+                    elif event.kind == ApprovalAsked.kind:
+                        asked = msgspec.json.decode(event.body, type=ApprovalAsked)
+                        if asked.graph is not None:
+                            self._questions[asked.graph].append(asked)
                 self._seq = events[-1].seq
-        return tuple(self._by_digest.get(digest, ()))
 
     async def item(
         self, robot: Registration, digest: str, starter: str, what: str = "this graph"
