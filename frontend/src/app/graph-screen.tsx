@@ -24,7 +24,6 @@ import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, useEditorSummary } from "../editor/editor";
 import { robotNames } from "../graph/robots";
 import { templatesOf, useKnownActions, usePlaceable } from "../home/known-actions";
-import { Sidebar } from "../home/sidebar";
 import { askedDryRun, useReplay } from "../review/replay";
 import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
@@ -43,6 +42,10 @@ import { instant } from "../ui/times";
 import { useNewGraphs } from "./imports/new-graphs";
 import { Nowhere, PageBar, PageFrame, useTitle } from "./page-frame";
 
+/** Its column is there before, and the graph needs none of it. */
+const Sidebar = boundedPart(() => import("../home/sidebar").then((part) => part.Sidebar), {
+  waiting: null,
+});
 const DraftStatus = boundedPart(
   () => import("../runs/draft-status").then((part) => part.DraftStatus),
   { waiting: null },

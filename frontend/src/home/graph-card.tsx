@@ -12,7 +12,6 @@ import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./graph-card.module.css";
 import { GraphCounts } from "./graph-counts";
-import { GraphMenu } from "./graph-menu";
 import home from "./home.module.css";
 
 /** Decoration, and the reading and laying out of graphs with it: the list is there without. */
@@ -20,6 +19,11 @@ const GraphPreview = boundedPart(
   () => import("./graph-preview").then((part) => part.GraphPreview),
   { frame: () => null },
 );
+
+/** Its button stands over the card, so nothing moves when it comes. */
+const GraphMenu = boundedPart(() => import("./graph-menu").then((part) => part.GraphMenu), {
+  waiting: null,
+});
 
 const FEW = 4; // robots or labels on a card
 

@@ -19,15 +19,6 @@ import { changeRobot, type Registration, registerRobot } from "../api/robots";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
 
-export const NEW: Registration = {
-  name: "",
-  domain: 0,
-  rmw: "",
-  get_service: "umrf_graph_get",
-  profile: {},
-  led: false,
-};
-
 type RobotFormField = "name" | "domain" | "get_service" | "rmw" | "profile";
 
 /** The field that a refusal points at; "" when it is about all of it. */

@@ -6,9 +6,21 @@ import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import { type FoundEngine, type Registration, useFoundEngines, useRosReach } from "../api/robots";
 import { Empty } from "../ui/empty";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { RobotCard } from "./robot-card";
-import { type EditedRobot, NEW, RobotForm } from "./robot-form";
+import type { EditedRobot } from "./robot-form";
 import style from "./robots-page.module.css";
+
+const RobotForm = lazyPart(() => import("./robot-form").then((part) => part.RobotForm));
+
+const NEW: Registration = {
+  name: "",
+  domain: 0,
+  rmw: "",
+  get_service: "umrf_graph_get",
+  profile: {},
+  led: false,
+};
 
 interface Props {
   /** Makes a graph of what a robot runs or was told. */
@@ -94,7 +106,9 @@ export function RobotsPage({ onImport }: Props) {
         ))}
         <FoundEngines may={may} onTake={take} on={reach?.no_reach === ""} />
       </div>
-      {editing && <RobotForm editing={editing} onClose={() => setEditing(null)} />}
+      <OverlayBoundary>
+        {editing && <RobotForm editing={editing} onClose={() => setEditing(null)} />}
+      </OverlayBoundary>
     </main>
   );
 }

@@ -79,7 +79,7 @@ function about({ description = "", least, most, type }: AskedInput): string {
 function Field({ asked, draft, wrong, proposals, readOnly, onChange }: FieldProps) {
   const [left, setLeft] = useState(false);
   const { name, action, type, unit = "", open } = asked;
-  const label = `${isolated(inputWords(name))} of ${isolated(spokenName(action))}`;
+  const spoken = `${isolated(inputWords(name))} of ${isolated(spokenName(action))}`;
   const description = about(asked);
   const shared = {
     label: (
@@ -87,7 +87,7 @@ function Field({ asked, draft, wrong, proposals, readOnly, onChange }: FieldProp
         <bdi>{inputWords(name)}</bdi> <small>{unit === "" ? type : isolated(unit)}</small>
       </>
     ),
-    "aria-label": label,
+    "aria-label": spoken,
     value: draft,
     required: open,
     withAsterisk: false,
@@ -110,7 +110,7 @@ function Field({ asked, draft, wrong, proposals, readOnly, onChange }: FieldProp
               key={of}
               size="compact-xs"
               variant="default"
-              aria-label={`Take ${JSON.stringify(value)} for ${label}: ${of}`}
+              aria-label={`Take ${isolated(JSON.stringify(value))} for ${spoken}: ${of}`}
               onClick={() => onChange(draftOf(asked, value))}
             >
               {of}:&nbsp;<bdi>{shortText(JSON.stringify(value), 24)}</bdi>

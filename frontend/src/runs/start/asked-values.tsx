@@ -177,15 +177,15 @@ interface WantedProps {
 
 /** Offers the values of a start for which somebody asks others. */
 function Wanted({ question, isTaken, onTake }: WantedProps) {
-  const who = <bdi>{question.author.name || "Somebody"}</bdi>;
+  const asker = <bdi>{question.author.name || "Somebody"}</bdi>;
   return (
     <div className={style.second}>
       <Text size="sm">
         {isTaken ? (
-          <>These are the values for which {who} asks.</>
+          <>These are the values for which {asker} asks.</>
         ) : (
           <>
-            {who} asks others for their yes, with {valuesWords(question.values)}.
+            {asker} asks others for their yes, with {valuesWords(question.values)}.
           </>
         )}
       </Text>
