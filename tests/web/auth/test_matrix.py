@@ -4,8 +4,7 @@ documents, for each kind of graph, run and robot, before and after each kind of 
 
 `TEST_MATRIX=1` asks every route with every graph, run and robot (`make soak ARGS=matrix`); a larger
 number, so many routes of each process. Otherwise some are asked, with one graph each, at six kinds of
-revocation, another choice
-each day.
+revocation: others each day.
 """
 
 import contextlib
