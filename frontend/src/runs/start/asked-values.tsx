@@ -81,6 +81,8 @@ function obstacleOf(
 }
 
 export interface AskedValues {
+  /** A value is missing or wrong, so nothing can be looked at. */
+  readonly isIncomplete: boolean;
   /** The values that are looked at and sent; null until all are given. */
   readonly values: StartValues | null;
   readonly obstacle: string | null;
@@ -151,7 +153,8 @@ export function useAskedValues(
     );
   };
   const obstacle = obstacleOf(known.asked, drafts, typed.wrong, !isSettled);
-  return { values, obstacle, error: known.error, taken, form };
+  const isIncomplete = typed.wrong.size > 0;
+  return { values, isIncomplete, obstacle, error: known.error, taken, form };
 }
 
 function proposalsFor(

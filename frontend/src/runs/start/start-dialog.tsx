@@ -451,17 +451,23 @@ export function StartDialog(props: Props) {
               {errorText(error)}
             </Text>
           )}
-          {(led ? [CONDUCTED, ...players.filter((each) => each !== SIMULATOR)] : engines).map(
-            (engine) => (
-              <PreflightList
-                key={engine}
-                engine={engine}
-                alone={!led && engines.length === 1}
-                look={looks?.find((each) => each.engine === engine)}
-                moment={{ graph, seq, onLeave: onClose, onLookAgain: lookSoon }}
-              />
-            ),
+          {given.isIncomplete && (
+            <Text size="sm" className="ink3">
+              It is looked at as soon as all values are given.
+            </Text>
           )}
+          {!given.isIncomplete &&
+            (led ? [CONDUCTED, ...players.filter((each) => each !== SIMULATOR)] : engines).map(
+              (engine) => (
+                <PreflightList
+                  key={engine}
+                  engine={engine}
+                  alone={!led && engines.length === 1}
+                  look={looks?.find((each) => each.engine === engine)}
+                  moment={{ graph, seq, onLeave: onClose, onLookAgain: lookSoon }}
+                />
+              ),
+            )}
         </section>
       )}
       {mayDrill && (drills || looks?.some(isDrillDue)) && (
