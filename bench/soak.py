@@ -187,6 +187,7 @@ PARTS: Final[dict[str, Part]] = {
             "tests/runner/execution/test_conducted_nested_courses.py",
             "tests/runner/execution/test_conducted_faults.py",
             "tests/runner/execution/test_led_presses.py",
+            "tests/runner/execution/test_led_simulated_histories.py",
         ),
     ),
     "sync": Part(
