@@ -146,6 +146,8 @@ for (const [kind, path] of CASES) {
       await expect(page).toHaveURL(`${proxy.url}/runs`);
       await page.getByRole("link", { name: "Robots", exact: true }).click();
       await expect(page).toHaveURL(`${proxy.url}/robots`);
+      // The bar comes anew with the page, without what was opened in the bar before.
+      await expect(page.getByRole("heading", { name: "No robot yet" })).toBeVisible();
       await page.getByRole("button", { name: "Share", exact: true }).click();
       const dialog = page.getByRole("dialog", { name: "Share" });
       await expect(
