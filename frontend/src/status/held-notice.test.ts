@@ -20,8 +20,17 @@ test("a held run says what goes on all the same, and on which robot", () => {
   };
   const words = heldWords(run({ actions }), NONE);
   expect(words?.why).toBe("Waiting: Look_0 on David: the robot does not answer.");
-  expect(words?.moving).toMatch(/^STILL MOVING: Drive.* on .?Carol.?, Beep.* on the sim/);
+  expect(words?.moving).toMatch(
+    /^STILL MOVING: Drive.* on .?Carol.?\. Not over, and moves nothing: Beep.* on the simulator\.$/,
+  );
   expect(words?.moving).not.toContain("Look");
+});
+
+test("what only the simulator plays is never said to move", () => {
+  const moving = (robot: string) =>
+    heldWords(run({ actions: { Beep_0: action("RUNNING", robot) } }), NONE)?.moving;
+  for (const robot of ["", "simulator"])
+    expect(moving(robot)).toMatch(/^Not over, and moves nothing/);
 });
 
 test("what a robot does that does not answer is not known, and may go on", () => {

@@ -23,9 +23,12 @@ import { useWatching, WatchTicks } from "./watching";
 
 const NEXT = 3; // buttons of actions that wait
 
-/** An action and its robot in words; the robot is "" in the simulator. */
+/** Return whether the simulator plays an action of this robot: nothing moves there. */
+const isPlayed = (robot: string) => robot === "" || robot === SIMULATOR;
+
+/** Return an action and its robot in words. */
 function placeWords(run: Run, action: string, robot: string): string {
-  const where = robot === "" || robot === SIMULATOR ? "the simulator" : isolated(robot);
+  const where = isPlayed(robot) ? "the simulator" : isolated(robot);
   return `${actionWords(run, action)} on ${where}`;
 }
 
@@ -41,17 +44,18 @@ function movingWords(run: Run, silent: ReadonlySet<string>): string {
     ...seen,
     ...movingRests(run).filter(({ action }) => !seen.some((each) => each.action === action)),
   ];
-  const said = (known: boolean) =>
-    begun
-      .filter(({ robot }) => silent.has(robot) !== known)
-      .map(({ action, robot }) => placeWords(run, action, robot))
-      .join(", ");
-  const [goes, unknown] = [said(true), said(false)];
+  const said = (start: string, holds: (robot: string) => boolean) => {
+    const places = begun
+      .filter(({ robot }) => holds(robot))
+      .map(({ action, robot }) => placeWords(run, action, robot));
+    return places.length === 0 ? "" : `${start}: ${places.join(", ")}.`;
+  };
   const sentences = [
-    goes === "" ? "" : `STILL MOVING: ${goes}.`,
-    unknown === "" ? "" : `Not known, and may go on: ${unknown}.`,
+    said("STILL MOVING", (robot) => !isPlayed(robot) && !silent.has(robot)),
+    said("Not known, and may go on", (robot) => silent.has(robot)),
+    said("Not over, and moves nothing", (robot) => isPlayed(robot) && !silent.has(robot)),
   ];
-  return sentences.join(" ").trim() || "No action was seen to move.";
+  return sentences.filter((each) => each !== "").join(" ") || "No action was seen to move.";
 }
 
 /**

@@ -1,6 +1,5 @@
 """A led run in the simulator over HTTP, with the real process of its engine, and who may let it go on."""
 
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -12,6 +11,7 @@ from action_assistant.umrf.breakpoints import Breakpoint
 from runner.api.test_run_guard import PEOPLE
 from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
+from support.waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +23,17 @@ def process(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]
     process.end()
 
 
-def until(client: httpx.Client, run: str, true: Callable[[dict[str, Any]], object]) -> Any:
+def seen(client: httpx.Client, run: str, true: Callable[[dict[str, Any]], object]) -> Any:
     """Return the run once that is true of it."""
-    deadline = time.monotonic() + 60
-    while not true(found := client.get(f"/api/runs/{run}").json()):
-        assert time.monotonic() < deadline, found
-        time.sleep(0.05)
-    return found
+
+    def shown() -> Any:
+        return client.get(f"/api/runs/{run}").json()
+
+    def found() -> Any:
+        now = shown()
+        return now if true(now) else None
+
+    return until("the run is not so", found, 60, shown)
 
 
 def waiting(client: httpx.Client) -> tuple[str, str]:
@@ -42,7 +46,7 @@ def waiting(client: httpx.Client) -> tuple[str, str]:
         script={"*": [{"after_s": 0.05}]},
     )
     run = started(client, msgspec.structs.replace(asked, version="led1"))["id"]
-    found = until(client, run, lambda run: run["held"] and run["held"].get("next"))
+    found = seen(client, run, lambda run: run["held"] and run["held"].get("next"))
     assert found["held"]["why"] == "Breakpoint before Work_1."
     assert found["actions"]["Work_1"]["visits"] == []
     return run, found["held"]["since"]
@@ -53,7 +57,7 @@ def test_an_editor_steps_and_lets_a_simulated_run_go_on(process: RunnerProcess) 
         run, since = waiting(client)
         answer = client.post(f"/api/runs/{run}/step", json={"since": since})
         assert answer.status_code == 202, answer.text
-        found = until(
+        found = seen(
             client,
             run,
             lambda run: run["held"] and run["held"].get("next") and run["held"]["since"] != since,

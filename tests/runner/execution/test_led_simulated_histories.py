@@ -130,7 +130,7 @@ class History:
 
 
 def course(graph: Graph) -> dict[str, int]:
-    """How often each action ends when the simulator plays the whole graph."""
+    """Return how many times each action ends when the simulator plays the whole graph."""
     ends = Counter(
         each.node
         for each in simulate(graph, script=Script({}), until_ms=1e6)
