@@ -26,6 +26,7 @@ from action_assistant.settings import (
     more_hosts,
 )
 from action_assistant.share_links import invitations_as_text, is_alive, is_ours
+from action_assistant.system.posix import cause_of_end
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.server.sockets import bound
@@ -153,7 +154,7 @@ class Child:
         self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
         wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
         self._again = now + wait
-        say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
+        say(f"{self.name} died ({cause_of_end(code)}); starting it again in {wait:g} s")
         return None
 
     def kill(self) -> None:
@@ -452,7 +453,3 @@ def _has_screen() -> bool:
     if sys.platform in {"darwin", "win32"}:
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _cause(code: int) -> str:
-    return signal.Signals(-code).name if code < 0 else f"exit code {code}"

@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Any
 
 import anyio
@@ -15,7 +16,7 @@ from action_assistant.errors import BadInput, Conflict, TooLarge, TooMany, Unava
 from action_assistant.runner.workers import Crashed, Lane, RunnerWorkers
 from action_assistant.web.auth import caller
 from action_assistant.web.auth.caller import BackgroundTasks, Caller, detach_from_request
-from runner.worker_tasks import devour, die, pid, refuse, spin, standing, stumble
+from runner.worker_tasks import devour, die, pid, refuse, spin, standing, stumble, write_and_die
 
 
 @pytest.fixture(scope="module")
@@ -73,12 +74,21 @@ async def test_a_worker_that_dies_is_told_and_the_next_one_works() -> None:
             assert await run_in_worker(max, 1, 2) == 2
 
 
-async def test_a_worker_that_was_killed_while_it_waited_is_replaced() -> None:
+async def test_a_worker_that_was_killed_while_it_waited_is_replaced_before_anybody_notices() -> (
+    None
+):
     async with lane() as run_in_worker:
-        os.kill(await run_in_worker(pid), signal.SIGKILL)
-        with pytest.raises(Crashed):
-            await run_in_worker(pid)
-        assert await run_in_worker(max, 1, 2) == 2
+        for _ in range(10):
+            killed = await run_in_worker(pid)
+            os.kill(killed, signal.SIGKILL)
+            assert await run_in_worker(pid) != killed
+
+
+async def test_work_that_kills_its_worker_is_done_once(tmp_path: Path) -> None:
+    async with lane() as run_in_worker:
+        with pytest.raises(Crashed, match="died"):
+            await run_in_worker(write_and_die, str(tmp_path / "lines"))
+        assert (tmp_path / "lines").read_text() == "once\n"
 
 
 async def test_memory_is_bounded() -> None:

@@ -30,6 +30,13 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+def write_and_die(path: str) -> None:
+    """Append a line to the file `path`, and kill this process."""
+    with Path(path).open("a") as file:
+        file.write("once\n")
+    die()
+
+
 def refuse() -> None:
     raise Conflict("It cannot be.", where={"path": "/umrf"})
 

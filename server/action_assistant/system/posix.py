@@ -4,6 +4,7 @@ can be imported on Windows."""
 
 import importlib
 import os
+import signal
 from pathlib import Path
 from typing import Any, Final
 
@@ -83,6 +84,14 @@ def user_exists(name: str) -> bool:
     except KeyError:
         return False
     return True
+
+
+def cause_of_end(code: int | None) -> str:
+    """Return how a process ended, for messages. `code`: its exit code or minus its signal, None
+    while it is still ending."""
+    if code is None:
+        return "it is still ending"
+    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
 def raise_descriptors() -> int:

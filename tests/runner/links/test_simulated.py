@@ -71,7 +71,9 @@ async def test_a_refusal_of_the_engine_is_told() -> None:
             await link.start(placed(sequence("endless"), "r2"))
 
 
-async def test_the_end_of_its_process_is_the_end_of_the_engine_with_the_reason() -> None:
+async def test_the_end_of_its_process_is_the_end_of_the_engine_with_the_reason(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     heard: list[Report] = []
     async with simulated() as link:
         with link.listen(heard.append):
@@ -82,6 +84,9 @@ async def test_the_end_of_its_process_is_the_end_of_the_engine_with_the_reason()
                     await anyio.sleep(0.01)
             assert (heard[-1].state, heard[-1].why) == (link.standing.state, link.standing.why)  # type: ignore[union-attr]
             assert "has died" in link.standing.why
+            with anyio.fail_after(10):
+                while "has died (SIGKILL)" not in caplog.text:  # noqa: ASYNC110
+                    await anyio.sleep(0.01)
             with pytest.raises(NoAnswer, match="has died"):
                 await link.get()
             await link.stop("endless")

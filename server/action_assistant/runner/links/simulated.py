@@ -46,6 +46,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.links.simulator import SimulatorLink, engine_of
 from action_assistant.runner.workers import child
+from action_assistant.system.posix import cause_of_end
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.semantics import Returned
 
@@ -293,7 +294,12 @@ class SimulatedLink:
                 else:
                     await self._take(partial(self._hear, said))
         except (asyncio.IncompleteReadError, OSError):
+            ended_by_us = bool(self._why)
             self._end(_DIED)
+            if self._process is not None and not ended_by_us:
+                await to_thread.run_sync(self._process.join, _ENDING_S)
+                cause = cause_of_end(self._process.exitcode)
+                log.error("the process of a simulated engine has died (%s)", cause)
 
     def _answer(self, number: int, said: Any) -> None:
         future = self._asked.get(number)

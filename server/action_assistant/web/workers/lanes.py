@@ -64,6 +64,7 @@ _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
 _FIRST_S: Final = 2.0  # after the start, which has enough to do by itself
 _ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
+_ORPHANED: Final = 64  # exit code of a process whose parent has ended
 _DIED: Final = "The process that worked on this has died; nothing came of it."
 
 
@@ -158,7 +159,7 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-        os._exit(0)
+        os._exit(_ORPHANED)
 
 
 def serve(wire: Connection) -> None:
@@ -264,6 +265,7 @@ class Lane:
         self.given_up = 0  # what took longer than `patience`
         self._turns: dict[str, anyio.Lock] = {}
         self._waiting: dict[str, int] = {}
+        self._closed = False
 
     async def __call__(self, work: Callable[..., T], /, *args: Any) -> T:
         """Return the result of `work(*args)`, run in a worker. Raise the exception of `work`;
@@ -318,7 +320,18 @@ class Lane:
 
     async def _done(self, request: bytes) -> bytes:
         """Send a request to a worker and return the reply. Raise Crashed or OutOfTime if the worker
-        dies, GaveUp after `patience` seconds."""
+        dies, GaveUp after `patience` seconds. If a worker was dead before it had read the request,
+        try one more."""
+        reply = await self._done_by_worker(request)
+        if reply is None and not self._closed:
+            reply = await self._done_by_worker(request)
+        if reply is None:
+            raise Crashed(_DIED)
+        return reply
+
+    async def _done_by_worker(self, request: bytes) -> bytes | None:
+        """Send a request to one worker and return the reply; None if the worker was dead before it
+        had read the request. Raise what `_done` raises."""
         self._idle = [each for each in self._idle if each.lives]
         worker = self._idle.pop() if self._idle else await self._hired()
         self._busy.add(worker)
@@ -336,8 +349,11 @@ class Lane:
             ) from late
         except (OSError, EOFError) as error:
             self.deaths += 1
-            log.error("%s: a worker has died (%r)", self._name, error)
-            if await to_thread.run_sync(worker.ran_out, limiter=self._threads):
+            code = await to_thread.run_sync(worker.ended, limiter=self._threads)
+            log.error("%s: a worker has died (%s)", self._name, posix.cause_of_end(code))
+            if isinstance(error, (BrokenPipeError, ConnectionResetError)):
+                return None
+            if code == -signal.SIGPROF:
                 raise OutOfTime("The process that worked on this took too long.") from error
             raise Crashed(_DIED) from error
         finally:
@@ -387,6 +403,7 @@ class Lane:
 
     def close(self) -> None:
         """Kill all worker processes of the pool."""
+        self._closed = True
         for worker in (*self._idle, *self._busy):
             worker.kill()
         self._idle.clear()
@@ -442,14 +459,17 @@ class _Worker:
         return self._process.is_alive()
 
     def asked(self, request: bytes) -> bytes:
-        """Send one request and return the reply. Raise OSError or EOFError if the process has died."""
+        """Send one request and return the reply. Raise BrokenPipeError or ConnectionResetError if
+        the process was dead before it had read the request, another OSError or EOFError if it died
+        afterwards."""
         self._wire.send_bytes(request)
         return self._wire.recv_bytes()
 
-    def ran_out(self) -> bool:
-        """Return whether the dead process was ended by its timer of processor time."""
+    def ended(self) -> int | None:
+        """Return the exit code of the dead process, or minus its signal; None if it is still ending
+        after some seconds."""
         self._process.join(_ENDING_S)
-        return self._process.exitcode == -signal.SIGPROF
+        return self._process.exitcode
 
     def kill(self) -> None:
         """Kill the process. A thread that waits for its reply gets an error at once."""
