@@ -84,6 +84,27 @@ test("an author marks an input, with the most that can be given, and undo takes 
   await saved(page);
 });
 
+test("a dry-run asks as a start does, and is played with what is given", async () => {
+  const { page } = ada;
+  await page.getByRole("button", { name: "Dry-run", exact: true }).click();
+  const asked = page.getByRole("region", { name: "Values" });
+  const bar = page.getByRole("region", { name: "Dry-run" });
+  const valve = asked.getByRole("textbox", { name: "valve of Turn" });
+  const moment = bar.getByRole("slider", { name: "Moment" });
+  await expect(
+    bar.getByRole("button", { name: /^Record this: Give valve of Turn/ }),
+  ).toBeDisabled();
+  await asked.getByRole("textbox", { name: "torque of Turn" }).fill("61");
+  await expect(asked).toContainText("60 at most.");
+  await asked.getByRole("button", { name: /in the graph/ }).click();
+  await valve.fill("valve_8");
+  await expect(moment).toHaveAttribute("aria-valuetext", /Turn runs/);
+  await bar.getByRole("button", { name: "2 values" }).click();
+  await expect(asked).toBeHidden();
+  await expect(bar.getByRole("button", { name: /^Record this: start v1/ })).toBeEnabled();
+  await bar.getByRole("button", { name: "Close the dry-run" }).click();
+});
+
 test("the simulator asks too: nothing starts without what is open, and nothing beyond its bounds", async () => {
   const { page } = ada;
   await page.getByRole("button", { name: /^Start v1 on simulator/ }).click();
@@ -143,6 +164,14 @@ test("the list, the run, and the comparison of two say what was set; run again b
   const differ = page.getByRole("list", { name: "Different values" });
   await expect(differ).toContainText("6.5 in run 1, as in the graph in run 2");
   await expect(page.getByText("Both ran exactly the same graph")).toBeHidden();
+  await expect(page.getByText("Every visit ended the same, with 2 different")).toBeVisible();
+  await expect(page.getByRole("tab", { name: "Differences 2" })).toBeVisible();
+  await page.goto(`${product.url}/runs/${first?.id}`);
+  const started = page.getByRole("list", { name: "Started with" });
+  await expect(started).toContainText('Turn valve = "valve_8"');
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+  await expect(started).toContainText('Turn valve = "ברז"');
   await page.goto(`${product.url}/runs/${first?.id}`);
   await page.getByRole("tab", { name: "Facts" }).click();
   await expect(page.getByText('Turn valve = "valve_8"').first()).toBeAttached();

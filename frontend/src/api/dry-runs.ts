@@ -9,7 +9,9 @@ export type TraceEvent = DryRunResult["trace"][number];
 export type Behaviour = EditorApi["Behaviour"];
 export type Script = EditorApi["Script"];
 export type Command = EditorApi["Command"];
-export type DryRunRequest = Required<Pick<EditorApi["Rehearsing"], "script" | "commands">> & {
+export type DryRunRequest = Required<
+  Pick<EditorApi["Rehearsing"], "script" | "commands" | "values">
+> & {
   seq: number;
 };
 

@@ -245,11 +245,12 @@ function Start({ settle }: Settled) {
 function Record() {
   const { id, seq, asks, obstacle: other, dryRun } = useEditorSummary();
   if (dryRun === null) return null;
-  const obstacle = other ?? (asks === "needs" ? "to fill in" : null);
-  const { decided, close } = dryRun;
-  return (
-    <RecordDryRun {...{ graph: id, seq, obstacle, script: scriptOf(decided), onStarted: close }} />
-  );
+  const { decided, given, close } = dryRun;
+  const missing = given === null && asks === "needs" ? "to fill in" : (given?.missing ?? null);
+  const obstacle = other ?? missing;
+  const script = scriptOf(decided);
+  const values = given?.values ?? {};
+  return <RecordDryRun {...{ graph: id, seq, obstacle, script, values, onStarted: close }} />;
 }
 
 type StripProps = Omit<

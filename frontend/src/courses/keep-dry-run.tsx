@@ -17,7 +17,9 @@ import style from "./courses.module.css";
 /** Return why a dry-run cannot become an expected course; null if it can. */
 function obstacleOf(run: DryRun): string | null {
   if (run.moments.length === 0) return "nothing happens in it";
-  return commandsOf(run.decided).length === 0 ? null : "somebody presses Stop in this dry-run";
+  if (commandsOf(run.decided).length > 0) return "somebody presses Stop in this dry-run";
+  const given = Object.keys(run.given?.values ?? {}).length > 0;
+  return given ? "values were given in this dry-run, and an expected course has none" : null;
 }
 
 export function KeepDryRun({ run }: { run: DryRun }) {

@@ -157,6 +157,7 @@ export function seedOf(run: Run, graph: Graph, differs: number, at: number): Dry
     inputs: Object.fromEntries(begun.map(({ node, inputs }) => [node, inputs])),
     ends: new Map(ends),
     values,
+    started: run.values ?? {},
     doubts,
   };
 }

@@ -1,6 +1,7 @@
 /** A moment of a recorded run as the beginning of a dry-run: what was so, and what nobody knows. Pure. */
 import type { Behaviour } from "../api/dry-runs";
 import type { Visit } from "../api/runs";
+import type { StartValues } from "../api/starts";
 import type { Key } from "../graph/model";
 import type { PlaybackState } from "./playback";
 
@@ -40,6 +41,8 @@ export interface DryRunSeed {
    */
   readonly ends: ReadonlyMap<string, string>;
   readonly values: readonly SeedValue[];
+  /** The values with which the run was started. */
+  readonly started: StartValues;
   readonly doubts: readonly SeedDoubt[];
 }
 

@@ -8,6 +8,7 @@ import {
   useState,
 } from "react";
 import { type TraceEvent, useDryRunResult } from "../api/dry-runs";
+import type { AskedInput, StartValues } from "../api/starts";
 import type { Graph, Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
@@ -34,6 +35,15 @@ import { type DryRunSeed, type SeedDoubt, seededMoment, withRecordedValues } fro
 
 export const DRY_RUN_SPEEDS = [0.5, 1, 4, 16] as const;
 
+/** The values with which a dry-run is played. */
+interface GivenValues {
+  /** Texts that a person typed, by place; they outlive a change of the layout. */
+  readonly edited: Readonly<Record<string, string>>;
+  readonly values: StartValues;
+  /** What a person has to do before the graph can be started with values; null if nothing. */
+  readonly missing: string | null;
+}
+
 export interface DryRun {
   readonly moments: readonly { readonly at: number }[];
   /** The moment that is shown. */
@@ -50,6 +60,10 @@ export interface DryRun {
   readonly busy: boolean;
   readonly failed: Error | null;
   readonly cut: boolean;
+  /** The inputs for which a start of the graph asks. */
+  readonly asked: readonly AskedInput[];
+  /** Null until the form for the values is there. */
+  readonly given: GivenValues | null;
   /** The moment of a run from which it starts; null: from its own start. */
   readonly seed: DryRunSeed | null;
   /** Facts of that moment that are unknown, or that the rules do not reach. */
@@ -60,6 +74,7 @@ export interface DryRun {
   /** Decide how the running action ends: that with the given key, else the first. */
   choose(outcome: DecidedOutcome, key?: Key): void;
   inject(fault: DecidedFault | null): void;
+  give(given: GivenValues): void;
   /** From the start, as if nothing had been decided. */
   restart(): void;
   close(): void;
@@ -157,13 +172,22 @@ function useDeciding(
 }
 
 /** Ask the editor for the result of the decisions while a dry-run is open. */
-function useResult(id: string, open: boolean, seq: number, decided: Decisions) {
+function useResult(
+  id: string,
+  open: boolean,
+  seq: number,
+  decided: Decisions,
+  values: StartValues = NO_VALUES,
+) {
   const wanted = useMemo(
-    () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided) } : null),
-    [open, seq, decided],
+    () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided), values } : null),
+    [open, seq, decided, values],
   );
   return useDryRunResult(id, wanted);
 }
+
+const NO_VALUES: StartValues = {};
+const NOT_ASKED: readonly AskedInput[] = [];
 
 /** With what it begins, what was decided since, and where in it one is. */
 function useDecisions() {
@@ -172,6 +196,7 @@ function useDecisions() {
   const [decided, setDecided] = useState(NOTHING_DECIDED);
   const [at, setAt] = useState(0);
   const [playing, play] = useState(false);
+  const [given, give] = useState<GivenValues | null>(null);
   const from = useCallback((before: Decisions) => {
     setDecided(before);
     setAt(0);
@@ -182,21 +207,24 @@ function useDecisions() {
       const before = seeded === null ? { ...NOTHING_DECIDED, before: script } : decidedBy(seeded);
       setSeed(seeded);
       setBeginning(before);
+      give(null);
       from(before);
     },
     [from],
   );
   const restart = useCallback(() => from(beginning), [from, beginning]);
-  return { seed, decided, setDecided, at, setAt, playing, play, begin, restart };
+  return { seed, decided, setDecided, at, setAt, playing, play, given, give, begin, restart };
 }
 
 /** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
 export function useDryRun(id: string, graph: Graph, seq: number) {
   const [open, setOpen] = useState(false);
-  const { seed, decided, setDecided, at, setAt, playing, play, ...beginnings } = useDecisions();
+  const { seed, decided, setDecided, at, setAt, playing, play, given, give, ...beginnings } =
+    useDecisions();
   const [goal, setGoal] = useState<number | null>(null);
   const [speed, setSpeed] = useState<number>(1);
-  const { data, isPlaceholderData, error: failed } = useResult(id, open, seq, decided);
+  const result = useResult(id, open, seq, decided, given?.values);
+  const { data, isPlaceholderData, error: failed } = result;
   const busy = data === undefined || isPlaceholderData;
   const trace = useMemo(() => data?.trace ?? [], [data]);
   const shown = useShownMoment(trace, at, graph, seed && !rewritesRun(decided, seed) ? seed : null);
@@ -231,16 +259,21 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   }, [reset]);
 
   const cut = data?.cut === true;
+  const asked = data?.asked ?? NOT_ASKED;
   const commands = useMemo(
-    () => ({ go, play, setSpeed, ...deciding, restart, close }),
-    [go, deciding, restart, close, play],
+    () => ({ go, play, setSpeed, ...deciding, give, restart, close }),
+    [go, deciding, give, restart, close, play],
   );
   const dryRun = useMemo<DryRun | null>(
     () =>
       open
-        ? { ...shown, playing, speed, decided, busy, failed, cut, seed, doubts, ...commands }
+        ? {
+            ...shown,
+            ...{ playing, speed, decided, busy, failed, cut, asked, given, seed, doubts },
+            ...commands,
+          }
         : null,
-    [open, shown, playing, speed, decided, busy, failed, cut, seed, doubts, commands],
+    [open, shown, playing, speed, decided, busy, failed, cut, asked, given, seed, doubts, commands],
   );
   return { dryRun, begin };
 }

@@ -24,11 +24,13 @@ import { howWords, runEndText, useRunStatus, visitDuration } from "../status/pro
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./compare-page.module.css";
 import { ComparedCanvas, Legend } from "./compared-cards";
 import {
   causeSentence,
+  differenceCount,
   differencesOf,
   outermostAid,
   sameAsSeen,
@@ -156,7 +158,7 @@ function Side({ found, onSelect }: SideProps) {
     <aside className={style.side} aria-label="What differs">
       <Tabs defaultValue="differences" keepMounted={false} className="stack h-full">
         <Tabs.List>
-          <Tabs.Tab value="differences">Differences {differencesOf(found).length}</Tabs.Tab>
+          <Tabs.Tab value="differences">Differences {differenceCount(found)}</Tabs.Tab>
           <Tabs.Tab value="steps">Step by step</Tabs.Tab>
         </Tabs.List>
         <Tabs.Panel value="differences" className={style.panel ?? ""}>
@@ -297,7 +299,7 @@ function ValueChanges({ found }: { found: Comparison }) {
   if (all.length === 0) return null;
   return (
     <>
-      <p className={style.same}>They were started with different values:</p>
+      <p className={style.same}>They were started with {counted(all.length, "different value")}:</p>
       <ul className="list-reset stack gap-50" aria-label="Different values">
         {all.map(({ place, words, a, b }) => (
           <li key={place} className="text-12 break-anywhere">

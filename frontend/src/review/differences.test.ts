@@ -5,6 +5,7 @@ import type { Visit } from "../api/runs";
 import {
   causeSentence,
   comparedActions,
+  differenceCount,
   differencesOf,
   likelyCause,
   outermostAid,
@@ -204,4 +205,8 @@ test("values with which only one of two runs was started are differences, and eq
     ["Go torque", "5", null],
     ["Look 1 at", null, "2"],
   ]);
+  const runs = [a, b].map((values, i) => ({ number: i + 1, engine: "x", values }));
+  const ran = comparison([closes], { a: runs[0], b: runs[1] } as unknown as Partial<Comparison>);
+  expect(differenceCount(ran)).toBe(3);
+  expect(causeSentence(ran)).not.toContain("Nothing that is known differed");
 });

@@ -245,7 +245,8 @@ export function causeSentence(found: Comparison): string | null {
   if (found.parting === null)
     return cause === null ? null : `${cause.charAt(0).toUpperCase()}${cause.slice(1)}.`;
   if (cause !== null) return `Likely because ${cause}.`;
-  return found.same_graph && found.same_engine && found.subgraphs.length === 0
+  const same = found.same_graph && found.same_engine && found.subgraphs.length === 0;
+  return same && valueDifferences(found).length === 0
     ? "Nothing that is known differed before."
     : "Nothing that differed before is known to explain it.";
 }
@@ -273,3 +274,7 @@ export function valueDifferences({ a, b }: Pick<Comparison, "a" | "b">): ValueDi
     }))
     .filter((each) => each.a !== each.b);
 }
+
+/** Return in how many visits and in how many values of their starts two runs differ. */
+export const differenceCount = (found: Comparison): number =>
+  differencesOf(found).length + valueDifferences(found).length;

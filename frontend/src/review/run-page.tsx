@@ -22,6 +22,7 @@ import { runEndText, runLabel, useRunStatus } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
 import { RestList } from "../status/rest-list";
 import { useUnsure } from "../status/silence";
+import { StartedWith } from "../status/started-with";
 import { StateLabel } from "../status/state-label";
 import { WaitButton } from "../status/wait-button";
 import { withWaits } from "../status/waits";
@@ -290,6 +291,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
       })}
       <main className={style.page}>
         <div className={style.why}>
+          <StartedWith run={newest} />
           <RunQuestions run={newest} />
           <RestList run={newest} />
           <FailureCauses runner={runner} run={newest} onShow={show} />

@@ -1,18 +1,12 @@
 /** The form for the values of a start: a field for each input that it asks for. */
 import { Button, NativeSelect, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
-import type { AskedInput, StartValue } from "../api/starts";
+import type { AskedInput } from "../api/starts";
 import { shortText, spokenName } from "../graph/field-words";
 import { isolated } from "../words/isolated";
-import { type Drafts, draftOf } from "./start-values";
+import { type Drafts, draftOf, type Proposal } from "./start-values";
 import style from "./start-values-form.module.css";
 import { inputWords, placeOfInput } from "./value-words";
-
-/** A value that somebody gave before, or that stands in the graph. */
-export interface Proposal {
-  readonly of: string;
-  readonly value: StartValue;
-}
 
 interface Props {
   asked: readonly AskedInput[];

@@ -1,7 +1,9 @@
 /** Values of a start: what people type for the inputs that it asks for, and what is sent of that. Pure. */
-import type { AskedInput, StartValue, StartValues } from "../api/starts";
+import type { AskedInput, EarlierValues, StartValue, StartValues } from "../api/starts";
+import { spokenName } from "../graph/field-words";
 import { parameterValueOf, shown, TYPES, typed } from "../graph/parameters/values";
-import { placeOfInput } from "./value-words";
+import { isolated } from "../words/isolated";
+import { inputWords, placeOfInput } from "./value-words";
 
 /** Typed texts by place. */
 export type Drafts = Readonly<Record<string, string>>;
@@ -75,7 +77,7 @@ const same = (a: StartValue, b: StartValue | undefined): boolean =>
   JSON.stringify(a) === JSON.stringify(b);
 
 /** Return the value that is given for an input; undefined for none. A name may be that of a member of all objects. */
-export function valueFor(
+function valueFor(
   { action, name }: Pick<AskedInput, "action" | "name">,
   values: StartValues | undefined,
 ): StartValue | undefined {
@@ -105,4 +107,38 @@ export function placeRefused(path: string): string | null {
   return top === "values" && action !== undefined && name !== undefined
     ? placeOfInput({ action, name })
     : null;
+}
+
+/** Return what a person has to do about the first input without a usable value; null if all have one. */
+export function missingWords(
+  asked: readonly AskedInput[],
+  drafts: Drafts,
+  wrong: ReadonlyMap<string, string>,
+): string | null {
+  const first = asked.find((each) => wrong.has(placeOfInput(each)));
+  if (first === undefined) return null;
+  const where = `${isolated(inputWords(first.name))} of ${isolated(spokenName(first.action))}`;
+  return (drafts[placeOfInput(first)] ?? "") === "" ? `Give ${where}` : `Correct ${where}`;
+}
+
+/** A value that somebody gave before, or that stands in the graph. */
+export interface Proposal {
+  readonly of: string;
+  readonly value: StartValue;
+}
+
+/** Return the values to choose from for an input. `before`: those of the run that is repeated. */
+export function proposalsFor(
+  asked: AskedInput,
+  before: StartValues | undefined,
+  earlier: EarlierValues | null,
+): Proposal[] {
+  const { value, example } = asked;
+  const known: [string, StartValue | undefined][] = [
+    ["in the graph", value],
+    ["that run", valueFor(asked, before)],
+    [`run ${earlier?.run}`, valueFor(asked, earlier?.values)],
+    ["example", example],
+  ];
+  return known.flatMap(([of, each]) => (each === undefined ? [] : [{ of, value: each }]));
 }

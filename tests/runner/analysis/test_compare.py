@@ -36,6 +36,7 @@ def went(
     events: list[Any] = [
         msgspec.structs.replace(
             REQUESTED,
+            values=more.get("values", {}),
             run=f"r{number}",
             number=number,
             graph_name=graph.name,
@@ -75,6 +76,18 @@ def test_runs_that_went_alike_do_not_part() -> None:
     assert found.parting is None
     assert found.text == "Every visit ended the same."
     assert found.same_graph
+
+
+def test_runs_that_went_alike_with_other_values_are_not_called_the_same() -> None:
+    course = [("Work_0", "true"), ("Work_1", "true")]
+    values = {"Work_0": {"valve": "v8", "torque": 5.0}}
+    found = compared(went(1, *course, values=values), went(2, *course, values=values))
+    assert found.text == "Every visit ended the same."
+    other = {"Work_0": {"valve": "v9", "torque": 5.0}, "Work_1": {"valve": "v9"}}
+    found = compared(went(1, *course, values=values), went(2, *course, values=other))
+    assert found.text == "Every visit ended the same, with 2 different values at the start."
+    found = compared(went(1, *course, values=values), went(2, ("Work_0", "error"), values=other))
+    assert found.parting is not None
 
 
 def test_the_parting_is_the_first_visit_with_another_result_and_what_was_said() -> None:

@@ -28,6 +28,7 @@ import { stopwatch } from "../../ui/times";
 import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import style from "./dry-run-bar.module.css";
+import { DryRunValues } from "./dry-run-values";
 
 const MOST = 12; // lines of each list that are shown
 
@@ -285,6 +286,7 @@ export function DryRunBar({
       <div className={style.row}>
         <span className={style.title}>Dry-run</span>
         <SeedNote run={run} />
+        <DryRunValues key={run.seed?.run} graph={context.id} run={run} />
         <Step context={context} editAction={editActions.restart}>
           <IconPlayerSkipBack size={17} aria-hidden />
         </Step>

@@ -14,6 +14,7 @@ import { Timeline, type Track } from "../../status/lanes/timeline";
 import { runLabel, type Tone } from "../../status/progress";
 import { RestList } from "../../status/rest-list";
 import { knownRest, type RobotRest, restWords } from "../../status/rests";
+import { StartedWith } from "../../status/started-with";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { instant } from "../../ui/times";
@@ -116,6 +117,7 @@ export function ShownRun(props: ShownRunProps) {
         cursor={cursor}
         onLive={() => onSeek(null)}
       />
+      {folded !== true && <StartedWith run={run} />}
       <RunQuestions run={run} />
       <RobotRests run={run} />
       {!inLine && (

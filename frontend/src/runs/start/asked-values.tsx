@@ -10,21 +10,20 @@ import {
   type ApprovalWanted,
   type AskedInput,
   fetchAskedInputs,
-  fetchEarlierValues,
   fetchWantedApprovals,
   type StartValues,
 } from "../../api/starts";
-import { spokenName } from "../../graph/field-words";
+import { useEarlierValues } from "../../status/earlier-values";
 import {
   type Drafts,
   firstDrafts,
+  missingWords,
   placeRefused,
+  proposalsFor,
   typedValues,
-  valueFor,
 } from "../../status/start-values";
-import { type Proposal, StartValuesForm } from "../../status/start-values-form";
-import { inputWords, placeOfInput, valueLines, valuesWords } from "../../status/value-words";
-import { isolated } from "../../words/isolated";
+import { StartValuesForm } from "../../status/start-values-form";
+import { valueLines, valuesWords } from "../../status/value-words";
 import style from "./start-dialog.module.css";
 
 const TYPING = 400; // ms without a key until robots are looked at
@@ -43,13 +42,7 @@ function useKnown(graph: string, umrf: string | undefined) {
     gcTime: 0,
   });
   const asks = (asked.data?.length ?? 0) > 0;
-  const earlier = useQuery({
-    queryKey: ["runs", "values", graph, person.id],
-    queryFn: ({ signal }) => fetchEarlierValues(runner ?? "", graph, person.id, signal),
-    enabled: asks,
-    staleTime: 0,
-    gcTime: 0,
-  });
+  const earlier = useEarlierValues(graph, asks);
   const wanted = useQuery({
     queryKey: ["approvals", "asked", graph],
     queryFn: ({ signal }) => fetchWantedApprovals(runner ?? "", graph, signal),
@@ -74,10 +67,7 @@ function obstacleOf(
   isTyping: boolean,
 ): string | null {
   if (asked === undefined) return "Looking …";
-  const first = asked.find((each) => wrong.has(placeOfInput(each)));
-  if (first === undefined) return isTyping ? "Looking …" : null;
-  const where = `${isolated(inputWords(first.name))} of ${isolated(spokenName(first.action))}`;
-  return (drafts[placeOfInput(first)] ?? "") === "" ? `Give ${where}` : `Correct ${where}`;
+  return missingWords(asked, drafts, wrong) ?? (isTyping ? "Looking …" : null);
 }
 
 export interface AskedValues {
@@ -155,21 +145,6 @@ export function useAskedValues(
   const obstacle = obstacleOf(known.asked, drafts, typed.wrong, !isSettled);
   const isIncomplete = typed.wrong.size > 0;
   return { values, isIncomplete, obstacle, error: known.error, taken, form };
-}
-
-function proposalsFor(
-  asked: AskedInput,
-  before: StartValues | undefined,
-  earlier: { values: StartValues; run: number } | null,
-): Proposal[] {
-  const { value, example } = asked;
-  const known: [string, Proposal["value"] | undefined][] = [
-    ["in the graph", value],
-    ["that run", valueFor(asked, before)],
-    [`run ${earlier?.run}`, valueFor(asked, earlier?.values)],
-    ["example", example],
-  ];
-  return known.flatMap(([of, each]) => (each === undefined ? [] : [{ of, value: each }]));
 }
 
 interface WantedProps {

@@ -4,6 +4,7 @@ import type { Script } from "../../api/dry-runs";
 import { useVersions } from "../../api/graphs";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
+import type { StartValues } from "../../api/starts";
 import { HoldButton } from "../../ui/hold-button";
 import { isolated } from "../../words/isolated";
 import { nextLabel, useStart } from "./use-start";
@@ -14,11 +15,13 @@ interface Props {
   obstacle: string | null;
   /** Outcomes that were chosen in the dry-run. */
   script: Script;
+  /** Values that were given in the dry-run. */
+  values: StartValues;
   /** The start is on its way: the dry-run may go. */
   onStarted: () => void;
 }
 
-export function RecordDryRun({ graph, seq, obstacle, script, onStarted }: Props) {
+export function RecordDryRun({ graph, seq, obstacle, script, values, onStarted }: Props) {
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
   const start = useStart(graph);
@@ -37,7 +40,10 @@ export function RecordDryRun({ graph, seq, obstacle, script, onStarted }: Props)
       question={`Start ${isolated(label)} in the simulator with the decisions made here? It is recorded as a run.`}
       disabled={why !== null || start.isPending}
       onHeld={() =>
-        start.mutate({ seq, engines: [SIMULATOR], digest: null, script }, { onSuccess: onStarted })
+        start.mutate(
+          { seq, engines: [SIMULATOR], digest: null, script, values },
+          { onSuccess: onStarted },
+        )
       }
     />
   );

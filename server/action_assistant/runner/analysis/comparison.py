@@ -582,7 +582,22 @@ def _verdict(a: Run, b: Run, steps: list[ComparedVisit], parting: Parting | None
         )
     if any(step.relation == "unknown" for step in steps):
         return "No difference was seen, but some results are not known, or some visits may have been missed."
+    different = _different_values(a, b)
+    if different:
+        return f"Every visit ended the same, with {different} at the start."
     return "Every visit ended the same."
+
+
+def _different_values(a: Run, b: Run) -> str:
+    """Return in words how many values of their starts differ; "" if none does."""
+    places = {
+        (action, name) for run in (a, b) for action, given in run.values.items() for name in given
+    }
+    count = sum(
+        a.values.get(action, {}).get(name) != b.values.get(action, {}).get(name)
+        for action, name in places
+    )
+    return "" if not count else "1 different value" if count == 1 else f"{count} different values"
 
 
 def _count(steps: int) -> str:
