@@ -180,7 +180,7 @@ PARTS: Final[dict[str, Part]] = {
         ),
     ),
     "conducted": Part(
-        "10,000 random graphs led on three robots, and 2,000 histories of led runs with faults",
+        "10,000 random graphs led on three robots, and 4,000 histories of led runs with faults",
         {"TEST_EXAMPLES": "250"},
         (
             "tests/runner/execution/test_conducted_courses.py",
@@ -188,6 +188,7 @@ PARTS: Final[dict[str, Part]] = {
             "tests/runner/execution/test_conducted_faults.py",
             "tests/runner/execution/test_led_presses.py",
             "tests/runner/execution/test_led_simulated_histories.py",
+            "tests/runner/execution/test_led_simulated_faults.py",
         ),
     ),
     "sync": Part(

@@ -224,6 +224,21 @@ async def test_an_action_that_cannot_be_loaded_ends_with_an_error_after_the_gate
 
 
 @virtual
+async def test_a_run_that_is_stopped_since_nothing_can_be_stored_is_not_called_finished() -> None:
+    harness = Harness()
+    async with harness.runner() as control:
+        run = (await control.start(simulated(sequence("task", 2)), ANN)).run.id
+        await until(lambda: now(control, run).actions["Work_0"].state == "RUNNING")
+        harness.journal.down = True
+        await anyio.sleep(20)
+        harness.journal.down = False
+        assert await ended(control, run) == "stopped"
+    found = harness.journal.history(run)
+    assert found.result != "on_true"
+    assert found.actions["Work_1"].visits == ()
+
+
+@virtual
 async def test_breakpoints_of_a_simulated_run_are_set_while_it_goes_on() -> None:
     async with Harness().runner() as control:
         run = (await control.start(simulated(sequence("task", 3)), ANN)).run.id

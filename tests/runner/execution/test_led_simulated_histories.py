@@ -42,7 +42,7 @@ from runner.harness import (
 )
 from support.doses import examples
 
-_PRESSES = ("wait", "go on", "step", "until", "marks", "restart", "rest", "rest")
+PRESSES = ("wait", "go on", "step", "until", "marks", "restart", "rest", "rest")
 
 
 class History:
@@ -57,24 +57,25 @@ class History:
 
     async def live(self) -> None:
         """Live through all presses, and then let the run go on until it has ended, or stop it."""
-        rest = [self.chance.choice(_PRESSES) for _ in range(self.chance.randint(3, 14))]
+        rest = [self.chance.choice(PRESSES) for _ in range(self.chance.randint(3, 14))]
         while True:
             async with self.harness.runner() as control:
                 if not self.run:
-                    started = await control.start(simulated(self.graph, *self._marks()), ANN)
+                    started = await control.start(simulated(self.graph, *self.marks()), ANN)
                     self.run = started.run.id
                 while rest and (press := rest.pop()) != "restart":
                     await anyio.sleep(self.chance.random() * 3)
                     if self.run in control.open:
                         with suppress(Refused):
-                            await self._press(control, press)
+                            await self.press(control, press)
                 if not rest:
                     await self._end(control)
                     return
                 if self.run not in control.open:
                     return
 
-    def _marks(self) -> tuple[Breakpoint, ...]:
+    def marks(self) -> tuple[Breakpoint, ...]:
+        """Return breakpoints at up to two actions."""
         names = [each.full_name for each in self.graph.actions]
         chosen = self.chance.sample(names, self.chance.randint(0, 2))
         return tuple(
@@ -86,7 +87,8 @@ class History:
             for name in chosen
         )
 
-    async def _press(self, control: ExecutionService, press: str) -> None:
+    async def press(self, control: ExecutionService, press: str) -> None:
+        """Do what a press does now, if anything."""
         now = control.open[self.run].run
         since = time(now.held.at) if now.held is not None else None
         nodes = [each.full_name for each in self.graph.actions]
@@ -94,7 +96,7 @@ class History:
             await control.wait(self.run, WaitRequest(), BEN)
         elif press == "marks":
             await control.set_breakpoints(
-                self.run, BreakpointsRequest(self._marks(), now.breakpoints), ANN
+                self.run, BreakpointsRequest(self.marks(), now.breakpoints), ANN
             )
         elif since is not None and press == "go on":
             await control.go_on(self.run, GoOnRequest(since), ANN)

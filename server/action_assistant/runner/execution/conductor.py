@@ -598,6 +598,9 @@ class Conductor:
             self._alarm("led_unset", f"{step.node} on {step.engine} {lacking}")
         returned = returned_of(ended)
         self.gate.halt_after(step, outcome, returned.outputs)
+        if self.gate.is_final and outcome == "on_stopped":
+            # Else the engine could take the end of its last action for the end of the graph.
+            await self._engine.stop_first(self._first.graph_name)
         await self._engine.returned(returned)
 
     def _end_step(self, step: Step, author: Author) -> None:

@@ -104,9 +104,18 @@ class LeadingEngine:
 
     async def stop(self, graph_name: str) -> None:
         """Stop the whole graph, in this engine and in each that takes its place."""
-        if not any(isinstance(step, Stopped) for _, step in self._course):
+        if not self._is_stopped:
             self._note(Stopped())
         await self._engine.stop(graph_name)
+
+    async def stop_first(self, graph_name: str) -> None:
+        """Stop the whole graph as `stop` does, unless that has been done."""
+        if not self._is_stopped:
+            await self.stop(graph_name)
+
+    @property
+    def _is_stopped(self) -> bool:
+        return any(isinstance(step, Stopped) for _, step in self._course)
 
     async def returned(self, returned: Returned) -> None:
         """Give the engine the end of a call, which another engine would be given, too."""

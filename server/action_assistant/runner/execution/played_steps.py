@@ -42,6 +42,8 @@ class PlayedSteps:
         self._clock_us = clock_us
         self._going: dict[int, Step] = {}  # that have begun and were not reported as ended, by call
         self._shown: dict[str, Step] = {}  # the newest that has begun, by full name of its action
+        #: The calls that an earlier process let begin.
+        self._before = frozenset(left.played) if left is not None else frozenset[int]()
         for number, node in left.played.items() if left is not None else ():
             self._going[number] = self._shown[node] = _step_of(number, node, self._graph)
 
@@ -57,9 +59,10 @@ class PlayedSteps:
         step = self._going.pop(played.number, None)
         if step is None:
             return
-        if not played.is_past:
+        if not played.is_past or played.number not in self._before:
+            # Also one that ended after its engine had died, before anybody knew: nobody has seen it end.
             self._gate.halt_after(step, played.outcome, played.outputs)
-        elif self._shown.get(step.node) is step:  # it was shown to its end, before this engine
+        elif self._shown.get(step.node) is step:  # it was shown to its end, by an earlier process
             del self._shown[step.node]
 
     def shows(self, change: Exact) -> bool:
