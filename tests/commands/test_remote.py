@@ -2,8 +2,9 @@
 
 import json
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -137,8 +138,9 @@ def _ended(run: dict[str, Any], action: str) -> bool:
     return any(visit["result"] == "true" for visit in run["actions"][action]["visits"])
 
 
-async def cut(product: Product, graph: str) -> None:
-    """Delete the arrow from A to B, as another client."""
+@asynccontextmanager
+async def drawing(product: Product, graph: str) -> AsyncIterator[Doc[Any]]:
+    """The document of a graph, as another client has it."""
     doc: Doc[Any] = Doc()
     relations = doc.get("relations", type=Map)
     address = f"{product.url}/api/graphs/{graph}/room"
@@ -149,6 +151,13 @@ async def cut(product: Product, graph: str) -> None:
         Provider(doc, HttpxWebsocket(socket, address)),
     ):
         await until(lambda: any("entry>" in key for key in relations))
+        yield doc
+
+
+async def cut(product: Product, graph: str) -> None:
+    """Delete the arrow from A to B, as another client."""
+    async with drawing(product, graph) as doc:
+        relations = doc.get("relations", type=Map)
         with doc.transaction():
             for key in list(relations):
                 if not key.startswith("entry>") and ">exit|" not in key:
@@ -156,6 +165,40 @@ async def cut(product: Product, graph: str) -> None:
         with product.editor() as editor:
             umrf = f"/api/graphs/{graph}/umrf"
             await until(lambda: not editor.get(umrf).json()["actions"][0].get("children"))
+
+
+async def wait_at(product: Product, graph: str, name: str, mark: str) -> None:
+    """Set a breakpoint at an action, as another client."""
+    async with drawing(product, graph) as doc:
+        actions = doc.get("actions", type=Map)
+        (key,) = (each for each, value in actions.items() if value == name)
+        actions[f"{key}|breakpoint"] = mark
+        with product.editor() as editor:
+            path = f"/api/graphs/{graph}/breakpoints"
+            await until(lambda: editor.get(path).json() != [])
+
+
+def test_a_led_run_takes_the_breakpoints_of_its_graph_where_the_command_says_so(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    anyio.run(wait_at, product, graph, "B", '{"visit": 1, "by": "a later page"}')
+    started: tuple[str, ...] = ("run", graph, "--robots", "=simulator", "--no-wait")
+    for more, waits in (
+        ((), None),
+        (("--breakpoints",), [{"action": "B_0", "visit": 1}]),
+        (
+            ("--breakpoints", "--break", "A_0"),
+            [{"action": "A_0"}, {"action": "B_0", "visit": 1}],
+        ),
+        (("--breakpoints", "--break", "B_0:7"), [{"action": "B_0", "visit": 7}]),
+    ):
+        answer = product.cli(*started, *more)
+        assert answer.returncode == 0, answer.stderr
+        run = answer.stdout.split()[0]
+        with product.runner() as runner:
+            assert runner.get(f"/api/runs/{run}").json().get("breakpoints") == waits
+        product.cli("stop", run)
 
 
 async def until(true: Callable[[], bool]) -> None:

@@ -238,6 +238,7 @@ ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "deleteGraph": None,  # the last thing that is done to a graph; below
     "recoverGraph": ("POST", "/api/graphs/{g}/recover", None),
     "getUmrf": ("GET", "/api/graphs/{g}/umrf?at=1", None),
+    "getBreakpoints": ("GET", "/api/graphs/{g}/breakpoints?at=1", None),
     "getProblems": ("GET", "/api/graphs/{g}/problems?seq=1", None),
     "getRewriting": ("POST", "/api/graphs/{g}/rewriting?seq=1", b"file"),
     "putUmrf": ("PUT", "/api/graphs/{g}/umrf?seq=1", b"file"),

@@ -3,7 +3,13 @@
 import msgspec
 import pytest
 
-from action_assistant.umrf.breakpoints import Breakpoint, NoSuchPlace, ValueTest, pinned
+from action_assistant.umrf.breakpoints import (
+    Breakpoint,
+    NoSuchPlace,
+    ValueTest,
+    breakpoints_in,
+    pinned,
+)
 from action_assistant.umrf.model import EXIT, Action, Conditions, Graph, Parameter, Relation
 
 LIFT, SCAN, STOP = (Action(key=name, name=name) for name in ("Lift", "Scan", "Halt"))
@@ -72,3 +78,34 @@ def test_an_output_can_be_a_condition_at_the_end() -> None:
     assert mark.holds(2, {"pose::x": 0.5})
     assert not mark.holds(1, {"pose::x": 0.5})
     assert not mark.holds(2, {"pose::x": 1.5})
+
+
+def test_a_start_names_the_breakpoints_of_a_graph_once_for_each_place_and_none_that_cannot_hold() -> (
+    None
+):
+    texts = {
+        "Lift": '{"outcomes":["error","true"],"value":{"name":"pose::x","test":"<","value":1}}',
+        "Scan": '{"visit":7,"colour":"red"}',
+        "Halt": '{"visit":-1}',
+        "Lift>Scan": "{}",
+        "Lift>Halt": "{}",  # a stop always passes
+        "Lift>exit": "no JSON",
+    }
+    drawn = graph()
+    actions = tuple(
+        msgspec.structs.replace(each, breakpoint=texts[each.key]) for each in drawn.actions
+    )
+    arrows = tuple(
+        msgspec.structs.replace(each, breakpoint=texts[f"{each.parent}>{each.child}"])
+        for each in drawn.relations
+    )
+    listed_twice = msgspec.structs.replace(arrows[0], breakpoint='{"visit":2}', listing=1)
+    marked = msgspec.structs.replace(drawn, actions=actions, relations=(*arrows, listed_twice))
+    found = breakpoints_in(marked)
+    test = ValueTest("pose::x", "<", 1)
+    assert found == (
+        Breakpoint(action="Lift_0", outcomes=("true", "error"), value=test),
+        Breakpoint(action="Scan_0", visit=7),
+        Breakpoint(action="Lift_0", to="Scan_0"),
+    )
+    assert len(pinned(marked, found)) == 3

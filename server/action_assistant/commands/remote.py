@@ -78,6 +78,11 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="with --robots: wait before this action, at each visit or at this one; again for each",
     )
     run.add_argument(
+        "--breakpoints",
+        action="store_true",
+        help="with --robots: wait at the breakpoints of the graph, too",
+    )
+    run.add_argument(
         "--accept",
         nargs=2,
         metavar=("CODE,…", "REASON"),
@@ -280,8 +285,9 @@ def _run(options: argparse.Namespace) -> int:
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
         if options.robots is not None:
             order |= {"engine": "conducted", "robots": options.robots, "lost": options.lost}
-        if options.breaks:
-            order["breakpoints"] = options.breaks
+        breakpoints = _breakpoints(server, version, options)
+        if breakpoints:
+            order["breakpoints"] = breakpoints
         if options.watching:
             order["watching"] = dict.fromkeys(options.watching, True)
         if options.values:
@@ -296,6 +302,25 @@ def _run(options: argparse.Namespace) -> int:
         run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
         print(run.id, flush=True)
         return 0 if options.no_wait else _watch(server, run.id)
+
+
+def _breakpoints(
+    server: Server, version: dict[str, Any], options: argparse.Namespace
+) -> list[dict[str, Any]]:
+    """Return where a run of a version waits: as the command says, and, if it says so, at the breakpoints
+    of the graph. Of two before one action that of the command counts."""
+    chosen: list[dict[str, Any]] = options.breaks
+    if not options.breakpoints:
+        return chosen
+    path = f"/api/graphs/{version['graph']}/breakpoints"
+    kept = server.editor("GET", path, params={"at": version["seq"]}).json()
+    said = {each["action"] for each in chosen}
+    of_graph = (
+        each
+        for each in kept
+        if each["action"] not in said or not {"to", "outcomes"}.isdisjoint(each)
+    )
+    return [*chosen, *of_graph]
 
 
 def _values(server: Server, umrf: Any, settings: Sequence[tuple[str, str]]) -> dict[str, Any]:

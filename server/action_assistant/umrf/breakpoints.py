@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.model import EXIT, Graph, Precondition, Response
+from action_assistant.umrf.model import EXIT, Graph, JsonText, Precondition, Relation, Response
 from action_assistant.umrf.parameters import flat_name
 
 Told: TypeAlias = Literal["true", "false", "error"]
@@ -86,6 +86,52 @@ class Breakpoint(
         )
 
 
+class _Kept(msgspec.Struct, frozen=True):
+    """A breakpoint as the document keeps it, with its action or arrow."""
+
+    visit: Annotated[int, msgspec.Meta(ge=0, le=1_000_000)] = 0
+    outcomes: tuple[Told, ...] = ()
+    value: ValueTest | None = None
+
+
+def breakpoints_in(graph: Graph) -> tuple[Breakpoint, ...]:
+    """Return the breakpoints that people have set in a graph, as a start of it names them, one for each
+    place. A text that says none is left out, and so is an arrow by which nothing goes on. The twin of
+    `startBreakpoints` in `graph/breakpoints.ts`."""
+    names = {each.key: each.full_name for each in graph.actions if not each.missing}
+    texts = [(names[each.key], "", each.breakpoint) for each in graph.actions if each.key in names]
+    ends = names | {EXIT: EXIT}
+    texts += [
+        (names[each.parent], ends[each.child], each.breakpoint)
+        for each in graph.relations
+        if each.parent in names and each.child in ends and _goes_on(each)
+    ]
+    found: dict[tuple[str, str], Breakpoint] = {}
+    for action, to, text in texts:
+        kept = _kept(text)
+        if kept is not None:
+            outcomes = tuple(each for each in _OUTCOMES if each in kept.outcomes)
+            one = Breakpoint(
+                action=action, to=to, visit=kept.visit, outcomes=outcomes, value=kept.value
+            )
+            found.setdefault((action, to), one)
+    return tuple(found.values())
+
+
+def _kept(text: JsonText) -> _Kept | None:
+    try:
+        return msgspec.json.decode(text, type=_Kept) if text else None
+    except (msgspec.ValidationError, msgspec.DecodeError):
+        return None
+
+
+def _goes_on(arrow: Relation) -> tuple[Told, ...]:
+    """Return the outcomes by which an arrow lets its child begin, or the graph end."""
+    return tuple(
+        told for told, outcome in _OUTCOMES.items() if arrow.conditions.answer(outcome) in _GOES_ON
+    )
+
+
 class NoSuchPlace(ValueError):
     """A breakpoint names no place of its graph where a run could wait; the text says why."""
 
@@ -118,12 +164,10 @@ def _on_arrow(graph: Graph, each: Breakpoint, parent: str) -> Breakpoint:
     ]
     if not arrows:
         raise NoSuchPlace(f"There is no arrow from {each.action} to {each.to}.")
-    goes: tuple[Told, ...] = tuple(
-        told
-        for told, outcome in _OUTCOMES.items()
-        if any(one.conditions.answer(outcome) in _GOES_ON for one in arrows)
+    goes = {told for one in arrows for told in _goes_on(one)}
+    outcomes = tuple(
+        told for told in _OUTCOMES if told in goes and (not each.outcomes or told in each.outcomes)
     )
-    outcomes = tuple(told for told in goes if not each.outcomes or told in each.outcomes)
     if not outcomes:
         raise NoSuchPlace(f"Nothing goes on by the arrow from {each.action} to {each.to} then.")
     return msgspec.structs.replace(each, outcomes=outcomes)

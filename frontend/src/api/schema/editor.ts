@@ -238,6 +238,23 @@ export interface EditorApi {
         message?: string | null;
     };
     /**
+     * Breakpoint
+     * @description Lets a led run wait before the action with the full name `action` begins; after it has ended, if
+     *     it has `outcomes`; or when it has ended and the arrow to the action `to` ("exit": the end of the
+     *     graph) lets that go on. `visit`: only at this visit of `action`, from 1; 0 for each. `value`: only
+     *     if an input meets this, or, after its end, an output.
+     */
+    Breakpoint: {
+        action: string;
+        /** @default  */
+        to?: string;
+        /** @default 0 */
+        visit?: number;
+        /** @default [] */
+        outcomes?: ("error" | "false" | "true")[];
+        value?: EditorApi["ValueTest"];
+    };
+    /**
      * BuildFault
      * @description An error of a compiler or of CMake. `file` is below the package, "" where none was named; `line`
      *     and `column` are from 1.
@@ -2513,6 +2530,16 @@ export interface EditorApi {
         renames?: EditorApi["Renames"];
     };
     /**
+     * ValueTest
+     * @description A condition on a value by its flat name (`pose::x`). No value is unequal to all.
+     */
+    ValueTest: {
+        name: string;
+        /** @enum {string} */
+        test: "!=" | "<" | "<=" | "==" | ">" | ">=";
+        value: boolean | number | string;
+    };
+    /**
      * VersionView
      * @description A version. `umrf`: the graph as text, kept unchanged; `subgraphs`: all graphs inside, by
      *     name; lists omit both. `tree_digest`: of the graph together with them, null for old versions.
@@ -2711,6 +2738,9 @@ export interface EditorPaths {
     };
     "/api/graphs/{graph_id}/problems": {
         get: EditorOperations["getProblems"];
+    };
+    "/api/graphs/{graph_id}/breakpoints": {
+        get: EditorOperations["getBreakpoints"];
     };
     "/api/graphs/{graph_id}/rewriting": {
         post: EditorOperations["getRewriting"];
@@ -3558,6 +3588,23 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["Problems"];
+                };
+            };
+        };
+    };
+    getBreakpoints: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Breakpoint"][];
                 };
             };
         };

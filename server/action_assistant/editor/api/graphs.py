@@ -19,6 +19,7 @@ from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput, Conflict
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
@@ -294,6 +295,18 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
             sight.seq, encoded(tuple[Problem, ...], await services.graph_checks.problems(sight))
         )
 
+    @get(
+        "/api/graphs/{graph_id:str}/breakpoints",
+        summary="Where led runs of a graph wait, as a start of it after its change `at` names that",
+        operation_id="getBreakpoints",
+        guards=[Needs("see")],
+    )
+    async def get_breakpoints(graph_id: str, at: SeqOrNone = None) -> list[Breakpoint]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, at)
+        return list(await services.graph_reader.ask(contents.breakpoints, sight))
+
     @post(
         "/api/graphs/{graph_id:str}/rewriting",
         status_code=200,
@@ -339,4 +352,4 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
             newest = await room.submit(found.update, person.id)
         return MergedGraph(newest, now > seq, found.problems)
 
-    return [get_umrf, get_problems, get_rewriting, put_umrf]
+    return [get_umrf, get_problems, get_breakpoints, get_rewriting, put_umrf]

@@ -13,6 +13,7 @@ from action_assistant.editor.documents import document
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
 from action_assistant.kit.lru_cache import LruCache
+from action_assistant.umrf.breakpoints import Breakpoint, breakpoints_in
 from action_assistant.umrf.check import check_written
 from action_assistant.umrf.checks.subgraphs import Resolution
 from action_assistant.umrf.digest import digest, tree_digest
@@ -192,6 +193,11 @@ def first_action(graph: Graph) -> Action | None:
 def problems(sight: GraphAtSeq, inside: Inside = NOTHING_INSIDE) -> bytes:
     """Return the JSON of the problems of a graph at a change (`sight`), with the graphs inside."""
     return msgspec.json.encode(read(sight).problems(inside))
+
+
+def breakpoints(sight: GraphAtSeq) -> tuple[Breakpoint, ...]:
+    """Return the breakpoints of a graph at a change (`sight`), as a start names them."""
+    return breakpoints_in(read(sight).moment.graph)
 
 
 def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
