@@ -126,8 +126,8 @@ function Waiting({ made, origins, onDone, onOver }: WaitingProps) {
       </output>
       {origins.length === 0 && (
         <Text size="sm" c="dimmed">
-          Only this computer reaches this server, so the code works in another browser here. For
-          other devices, restart it with <code>action-assistant serve --share</code>.
+          Only this computer reaches this server, so the code works only in another browser on it.
+          For other devices, restart the server with <code>action-assistant serve --share</code>.
         </Text>
       )}
       <Text size="sm" c="dimmed">

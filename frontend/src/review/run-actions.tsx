@@ -92,7 +92,7 @@ function ExportButton({ runner, run }: Pick<Props, "runner" | "run">) {
             leftSection={<IconPrinter size={15} aria-hidden />}
             onClick={() => setTimeout(() => window.print(), 0)}
           >
-            Record on paper (print or PDF)
+            Print it, or save it as PDF
           </Menu.Item>
           {mayKeep && (
             <Menu.Item

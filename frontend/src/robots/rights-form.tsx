@@ -158,8 +158,8 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
           {!all && <Operators chosen={chosen} onChange={setChosen} />}
           {!all && (
             <Text size="sm" c="dimmed">
-              This counts for owners too. A last day, such as that of a briefing, ends the right.
-              Everybody can always press Stop.
+              The list counts for owners too. A last day, such as that of a briefing, ends the
+              right. Everybody can always press Stop.
             </Text>
           )}
           <Switch

@@ -72,7 +72,7 @@ function robotSigns(robot: Robot): Sign[] {
     signs.push({ good: false, text: `${isolated(who)} can also start graphs on it` });
   }
   if (robot.actor !== "" && robot.actor !== robot.name) {
-    signs.push({ good: false, text: `Its feedback calls itself ${robot.actor}` });
+    signs.push({ good: false, text: `Its feedback has another name: ${robot.actor}` });
   }
   return signs;
 }

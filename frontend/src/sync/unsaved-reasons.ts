@@ -37,7 +37,7 @@ export function otherPeopleWait(others: readonly OtherPerson[]): string | null {
 
 const refusals: Readonly<Record<RefusalReason, string>> = {
   "session-ended": "You are signed out.",
-  "other-person": "Somebody else is signed in in this browser now.",
+  "other-person": "Somebody else is signed in now, in this browser.",
   forbidden: "You may look at this graph, not change it.",
   "no-such-graph": "This graph is gone.",
   "other-epoch": "The server went back to an older state of this graph, from a backup perhaps.",

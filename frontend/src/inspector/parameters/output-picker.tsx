@@ -61,7 +61,7 @@ function Choices({ choices, search, renamed }: ListProps) {
       {renamed && (
         <Combobox.Option value="" className={style.choice ?? ""}>
           <span className={style.from}>
-            <IconLinkOff size={13} aria-hidden /> Take it from no output
+            <IconLinkOff size={13} aria-hidden /> Do not take it from an output
           </span>
         </Combobox.Option>
       )}

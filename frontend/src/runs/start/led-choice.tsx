@@ -120,13 +120,13 @@ export function WayChoice({ led, several, onLed }: WayProps) {
       name: "Hand over the whole graph",
       means: several
         ? "The engine gets the whole graph at once. For a graph of several robots, only the simulator can do that."
-        : "The robot gets the whole graph at once and carries it out by itself. It goes on when this server or the network fails.",
+        : "The robot gets the whole graph at once and carries it out by itself. It goes on even if this server or the network fails.",
     },
     {
       value: true,
       name: "Lead it step by step",
       means:
-        "The runner sends each robot one action at a time, and sees each result. When it or the network fails, nothing further begins; what was begun goes on.",
+        "The runner sends each robot one action at a time, and sees each result. If this server or the network fails, nothing further begins; what was begun goes on.",
     },
   ];
   return (

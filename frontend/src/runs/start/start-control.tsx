@@ -72,7 +72,7 @@ export function StartControl(props: Props) {
           name={why === null ? `Start ${label} in the simulator` : `Start ${label}: ${why}`}
           question={
             goes
-              ? `A run of this graph goes already. Start ${isolated(label)} beside it, in the simulator?`
+              ? `A run of this graph is going on already. Start ${isolated(label)} beside it, in the simulator?`
               : `Start exactly ${isolated(label)}, as it is on screen, in the simulator?`
           }
           disabled={why !== null}
