@@ -95,7 +95,7 @@ def found_by_name(outer: Graph, graphs: dict[str, Graph]) -> set[str]:
 
 
 def test_a_hierarchy_may_be_deeper_than_the_stack_of_the_interpreter() -> None:
-    depth = 2 * sys.getrecursionlimit()
+    depth = sys.getrecursionlimit() + 50
     chain = {f"L{n}": graph(f"L{n}", action(f"L{n + 1}")) for n in range(depth)}
     chain[f"L{depth}"] = graph(f"L{depth}", action("A"), exits=False)
     (problem,) = check(graph("outer", action("L0")), graphs=chain)
