@@ -205,7 +205,7 @@ PARTS: Final[dict[str, Part]] = {
     "long": Part(
         "what CI has no time for: one more product, database or command each",
         {"TEST_LONG": "1"},
-        ("-m", "long", "tests"),
+        ("-m", "long or turns", "tests"),
     ),
     "documents": Part(
         "every command of the documents that takes seconds",

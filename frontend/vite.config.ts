@@ -206,7 +206,7 @@ export default defineConfig({
     projects: [
       // What has no document leaves nothing behind, so its files share what they import.
       { extends: true, test: { name: "pure", include: ["src/**/*.test.ts"], isolate: false } },
-      { extends: true, test: { name: "page", include: ["src/**/*.test.tsx"] } },
+      { extends: true, test: { name: "page", include: ["src/**/*.test.tsx"], isolate: false } },
     ],
   },
 });

@@ -16,7 +16,7 @@ from hypothesis import settings
 
 from journal import servers
 from journal.servers import Server
-from support import skips
+from support import doses, skips
 from support.recordings import CORPUS, NO_CORPUS, family
 
 # `make containers` runs these, as root, for a quarter of an hour.
@@ -44,13 +44,19 @@ def _context_once(verify: Any = True, cert: Any = None, trust_env: bool = True) 
 httpx._transports.default.create_ssl_context = _context_once
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what only `make soak` has time for."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Skip what only `make soak` has time for, and what has its turn on another day, unless its file
+    is named."""
     if "TEST_LONG" in os.environ:
         return
+    files_named = any(".py" in argument for argument in config.args)
     for item in items:
         if item.get_closest_marker("long"):
             item.add_marker(pytest.mark.skip(reason="takes long: `make soak ARGS=long`"))
+            continue
+        waits = item.get_closest_marker("turns") and not doses.has_its_turn(item.nodeid)
+        if waits and not files_named:
+            item.add_marker(pytest.mark.skip(reason="has its turn on another day: TEST_DAY"))
 
 
 def skipped(config: pytest.Config) -> Counter[str]:

@@ -53,3 +53,32 @@ def test_ci_fails_when_a_test_is_skipped_for_a_reason_that_nobody_accepted(
     assert "2 tests were skipped: 1 × because; 1 × it is late" in done.stdout
     assert ("CI may not skip this (tests/skips.toml): because" in done.stdout) == ci
     assert done.returncode == int(ci), done.stdout
+
+
+def test_a_test_with_turns_is_tried_every_third_day_or_when_its_file_is_named(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "test_many.py").write_text(
+        "import pytest\n\n\n"
+        "@pytest.mark.turns\n"
+        "@pytest.mark.parametrize('n', range(30))\n"
+        "def test_it(n):\n    pass\n"
+    )
+
+    def tried(day: int, where: str) -> int:
+        options = ["-p", "conftest", "-p", "no:cacheprovider", "-o", "markers=turns"]
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", "-q", f"--rootdir={tmp_path}", *options, where],
+            cwd=tmp_path,
+            env={k: v for k, v in os.environ.items() if k != "TEST_LONG"}
+            | {"PYTHONPATH": str(TESTS), "TEST_DAY": str(day)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return int(done.stdout.splitlines()[-1].split(" passed")[0])
+
+    days = [tried(day, ".") for day in range(3)]
+    assert sum(days) == 30
+    assert all(days)
+    assert tried(0, "test_many.py") == 30

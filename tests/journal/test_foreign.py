@@ -117,6 +117,7 @@ def _migrated(path: Path) -> None:
     migrate(f"sqlite:///{path}", "editor")
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("step", [_opened, _prepared, _migrated])
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_a_foreign_database_is_refused_and_left_as_it_is(

@@ -94,6 +94,7 @@ def test_restore_drops_what_is_not_ours_and_says_so(
     assert main(["verify", "--data", str(tmp_path / "new")]) == 0
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize(
     ("sql", "branch"), [*zip(REFUSED, itertools.cycle(BRANCHES), strict=False)]
 )

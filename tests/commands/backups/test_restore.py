@@ -289,6 +289,7 @@ def put(staged: Path, data: Path, file: Path, url: str, dies_at: int) -> None:
     os._exit(0)
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("before", ["an empty folder", "a folder in use"])
 def test_a_kill_at_any_step_leaves_all_as_it_was_or_whole_or_marked(
     data: Path, file: Path, tmp_path: Path, before: str

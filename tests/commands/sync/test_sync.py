@@ -302,6 +302,7 @@ _CHANGES = (
 _WAYS = [("kill", True), ("kill", False), ("fail", True), ("fail", False), ("half", False)]
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize(
     ("how", "links"),
     _WAYS,
@@ -406,6 +407,7 @@ def _socket(place: Path, outside: Path) -> None:
 _THINGS = (_link_to_a_file, _link_to_nowhere, _link_to_itself, _folder, _fifo, _socket)
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("when", ["new", "known", "named by a graph", "copy"])
 @pytest.mark.parametrize("thing", _THINGS, ids=[each.__name__[1:] for each in _THINGS])
 def test_a_link_or_folder_in_place_of_a_file_is_reported_and_other_files_go_on(
@@ -528,6 +530,7 @@ def test_a_state_that_is_no_file_is_named_and_nothing_is_done(
     assert place.http.get("/api/graphs").json() == []
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("mode", [0o640, 0o600, 0o444, 0o664])
 @pytest.mark.parametrize("links", [True, False], ids=["links", "no-links"])
 def test_a_file_and_its_copy_stay_as_open_to_others_as_the_file_was(

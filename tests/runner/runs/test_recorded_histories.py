@@ -100,6 +100,7 @@ def _laps(letters: str) -> int:
     return began
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("name", FACTS["told"])
 def test_a_recording_of_a_real_node_is_told_as_its_index_says(name: str) -> None:
     files = [

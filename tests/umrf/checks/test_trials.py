@@ -134,6 +134,7 @@ def test_a_trap_is_found_wherever_it_stands(count: int, at: int) -> None:
     assert found[0].where.path == f"/actions/{at}"
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize(
     "shape",
     [

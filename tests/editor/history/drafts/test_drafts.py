@@ -189,6 +189,7 @@ async def test_drafts_are_rebuilt_from_the_log(editor: Editor) -> None:
     assert await editor.drafts.get(made.id) == before
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("seed", range(examples(10)))
 async def test_blame_names_who_did_it_however_often_and_whichever_way_it_was_merged(
     editor: Editor, seed: int
@@ -223,6 +224,7 @@ async def _blamed(editor: Editor, graph: str) -> None:
                 assert each.merged is None or each.merged.by.id == "zoe"
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("seed", range(examples(10)))
 async def test_a_merge_that_is_taken_back_leaves_the_origin_as_it_was(
     editor: Editor, seed: int
@@ -242,6 +244,7 @@ async def test_a_merge_that_is_taken_back_leaves_the_origin_as_it_was(
     assert plain(await editor.now(editor.origin)) == plain(before)
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("seed", range(examples(10)))
 async def test_both_sides_are_equal_after_merges_in_both_directions(
     editor: Editor, seed: int
