@@ -3,6 +3,7 @@
 import { expect, type Page, test } from "@playwright/test";
 import { card, holdEnter, saved } from "./canvas";
 import { type Person, Product } from "./product";
+import { choose } from "./valves";
 
 const product = new Product();
 let ada: Person;
@@ -21,15 +22,16 @@ const waits = (page: Page) =>
   page.getByRole("region", { name: "The run waits for a person" }).filter({ visible: true });
 const runs = () => product.ask<{ id: string; state: string }[]>("/api/runs", {}, product.runnerUrl);
 
-/** Three actions, one after the other. */
-async function line(): Promise<string> {
-  const names = ["Drive", "Grip", "Lift"].map((name) => ({ name, instance_id: 0 }));
+/** Actions one after the other. */
+async function line(graph_name: string, count: number): Promise<string> {
+  const all = ["Drive", "Grip", "Lift", "Look", "Drop"].slice(0, count);
+  const names = all.map((name) => ({ name, instance_id: 0 }));
   const actions = names.map((each, i) => ({
     ...{ ...each, type: "sync" },
     ...{ parents: names.slice(Math.max(0, i - 1), i), children: names.slice(i + 1, i + 2) },
   }));
-  const ends = { graph_entry: names.slice(0, 1), graph_exit: names.slice(2) };
-  const body = JSON.stringify({ graph_name: "line", ...ends, actions });
+  const ends = { graph_entry: names.slice(0, 1), graph_exit: names.slice(-1) };
+  const body = JSON.stringify({ graph_name, ...ends, actions });
   const headers = { "content-type": "application/json" };
   const made = await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers });
   return made.id;
@@ -37,7 +39,7 @@ async function line(): Promise<string> {
 
 test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends it at the gate", async () => {
   const { page } = ada;
-  await page.goto(`${product.url}/graphs/${await line()}`);
+  await page.goto(`${product.url}/graphs/${await line("line", 3)}`);
   await saved(page);
   await card(page, "Grip").click({ position: { x: 40, y: 24 } });
   await page.keyboard.press("F9");
@@ -74,4 +76,55 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   await page.getByRole("button", { name: /^Stop/ }).first().click();
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
   await expect(waits(page)).toBeHidden();
+});
+
+test("on the canvas of a run people let it wait at an action and an arrow, and go on until one", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${await line("belt", 5)}`);
+  await saved(page);
+  await card(page, "Grip").click({ position: { x: 40, y: 24 } });
+  await page.keyboard.press("F9");
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  const start = dialog(page).getByRole("button", { name: /^Start v\d+, step by step, on/ });
+  await expect(start).toBeEnabled({ timeout: 15_000 });
+  await holdEnter(page, start);
+  await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });
+  const at = (place: string) =>
+    page.getByRole("region", { name: new RegExp(`^${place} in run`) }).filter({ visible: true });
+
+  // In the editor the run has breakpoints of its own beside those of the graph.
+  await choose(page, "Look");
+  await at("Look 0")
+    .getByRole("button", { name: /^Let run \d+ wait at Look 0$/ })
+    .click();
+  await expect(at("Look 0")).toContainText("This run waits before this.");
+  await expect(card(page, "Look").locator("[data-breakpoint]")).toBeVisible();
+
+  const [run] = await runs();
+  await page.goto(`${product.url}/runs/${run?.id}`);
+  await expect(card(page, "Look").locator("[data-breakpoint]")).toBeVisible();
+  await card(page, "Lift").focus();
+  await page.keyboard.press("Enter");
+  const far = at("Lift 0").getByRole("button", { name: /go on until Lift 0 is about to begin$/ });
+  await expect(far).toBeEnabled();
+  await page.locator('[aria-label^="Arrow from Lift 0, when true"]').focus();
+  await page.keyboard.press("Enter");
+  await at("Lift 0 → Look 0")
+    .getByRole("button", { name: /^Let run/ })
+    .click();
+  await expect(page.locator(".react-flow__edgelabel-renderer [data-breakpoint]")).toBeVisible();
+
+  await card(page, "Look").click({ position: { x: 40, y: 24 } });
+  const removed = at("Look 0").getByRole("button", { name: /no longer wait at Look 0$/ });
+  await holdEnter(page, removed);
+  await expect(removed).toBeHidden();
+  await card(page, "Lift").click({ position: { x: 40, y: 24 } });
+  await holdEnter(page, far);
+  await expect(waits(page)).toContainText("It went on until Lift_0", { timeout: 15_000 });
+  await holdEnter(page, waits(page).getByRole("button", { name: /^Let run \d+ go on$/ }));
+  await expect(waits(page)).toContainText("towards Look_0", { timeout: 15_000 });
+  await page.getByRole("button", { name: /^Stop/ }).first().click();
+  await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
+  await expect(at("Lift 0")).toBeHidden();
 });

@@ -262,6 +262,22 @@ export function letStep(
   });
 }
 
+/**
+ * Set where a led run waits. To take one away is a start. `was`: those that the person saw; it is refused if
+ * there are others now.
+ */
+export function setRunBreakpoints(
+  runner: string,
+  run: string,
+  breakpoints: readonly RunBreakpoint[],
+  was: readonly RunBreakpoint[],
+  watching: Watching,
+): Promise<Run> {
+  const sent = { breakpoints, was } as Pick<RunnerApi["BreakpointsRequest"], "breakpoints" | "was">;
+  const body = { ...sent, watching };
+  return runnerAt(runner).put("/api/runs/{run}/breakpoints", { path: { run }, body });
+}
+
 /** Let a led run begin nothing further. What was begun goes on. */
 export function letWait(runner: string, run: string): Promise<Run> {
   return sendPress(`wait ${run}`, (request) =>

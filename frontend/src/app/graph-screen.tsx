@@ -31,7 +31,6 @@ import type { Waits } from "../runs/sent-graph";
 import { StartControl } from "../runs/start/start-control";
 import type { Unsure } from "../status/progress";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
-import { asksPeople } from "../status/rests";
 import { useUnsure } from "../status/silence";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
@@ -53,8 +52,8 @@ const DraftStatus = boundedPart(
 const RunWaits = boundedPart(() => import("../runs/sent-graph").then((part) => part.RunWaits), {
   waiting: null,
 });
-const RunQuestions = boundedPart(
-  () => import("../status/held-notice").then((part) => part.RunQuestions),
+const RunSteering = boundedPart(
+  () => import("../runs/run-steering").then((part) => part.RunSteering),
   { waiting: null },
 );
 const RecordDryRun = lazyPart(() =>
@@ -157,7 +156,7 @@ function Inside({ id }: { id: string }) {
   const placeable = usePlaceable(id);
   const known = useMemo(() => templatesOf(placeable), [placeable]);
   const { going, choose: chooseRun, live, run, label, unsure, inside } = useShownRun(id);
-  const { runner, now } = useLive();
+  const { runner } = useLive();
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
   const drawn = past ? replay.run : live;
@@ -215,7 +214,7 @@ function Inside({ id }: { id: string }) {
           />
         }
         seed={seed}
-        held={live && asksPeople(live, now.engines) && <RunQuestions run={live} />}
+        held={live?.ended_at === null && <Held run={live} past={past} />}
         corner={<Corner run={live} whose={going.length > 1} />}
       />
     </>
@@ -255,12 +254,19 @@ function Record() {
 
 type StripProps = Omit<
   ComponentProps<typeof RunDrawer>,
-  "graph" | "selected" | "onPick" | "folded" | "onFold"
+  "graph" | "selected" | "point" | "onPick" | "folded" | "onFold"
 >;
 
 function Strip(props: StripProps) {
-  const { graph, selected, pick, folded, fold } = useEditorSummary();
-  return <RunDrawer {...props} {...{ graph, selected, onPick: pick, folded, onFold: fold }} />;
+  const { graph, selected, point, pick, folded, fold } = useEditorSummary();
+  const shown = { graph, selected, point, onPick: pick, folded, onFold: fold };
+  return <RunDrawer {...props} {...shown} />;
+}
+
+/** What people can do in the run, beside the canvas of a phone. */
+function Held({ run, past }: { run: Run; past: boolean }) {
+  const { point } = useEditorSummary();
+  return <RunSteering run={run} point={past ? null : point} />;
 }
 
 const StillSidebar = memo(Sidebar);

@@ -6,7 +6,7 @@ import { robotNames } from "../graph/robots";
 import type { Progress } from "../status/progress";
 import { NAME_RANK, useNameColors } from "../ui/name-colors";
 import { LineContext, LineStore } from "./arrows/line-store";
-import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
+import { type Arrow, type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
 import { useLaidOut } from "./geometry/layout";
 import { NO_PROBLEM_MARKS } from "./marks/problem-marks";
 import { edgeTypes, nodeTypes } from "./node-types";
@@ -22,6 +22,8 @@ interface Props {
   selected?: ReadonlySet<string>;
   label: string;
   onSelect?: (key: Key | null) => void;
+  /** Called with the id of a relation; without it arrows cannot be chosen. */
+  onSelectArrow?: ((id: string) => void) | undefined;
   /** Distinguishes several canvases on one page. */
   id?: string;
   /** Another canvas moves its view, so it does not fit the graph by itself. */
@@ -36,6 +38,7 @@ const LARGE = 150; // cards; beyond this number, cards out of sight are not rend
 
 export function GraphView(props: Props) {
   const { graph, progress, selected = NONE, label, onSelect, led = false, onPanned } = props;
+  const { onSelectArrow } = props;
   useNameColors(NAME_RANK.actors, robotNames(graph.actions));
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
   const laidOut = useLaidOut(graph);
@@ -60,7 +63,7 @@ export function GraphView(props: Props) {
   if (laidOut === null) return <div aria-busy="true" aria-label={label} role="img" />;
   return (
     <LineContext value={lines}>
-      <ReactFlow<CanvasNode>
+      <ReactFlow<CanvasNode, Arrow>
         key={laidOut.plain ? "plain" : "laid out"}
         {...(props.id === undefined ? {} : { id: props.id })}
         nodes={nodes}
@@ -68,6 +71,10 @@ export function GraphView(props: Props) {
         nodeTypes={nodeTypes}
         edgeTypes={edgeTypes}
         onNodesChange={(changes) => {
+          // Chosen by a key; a click tells that by itself.
+          const chosen = changes.find((each) => each.type === "select" && each.selected);
+          if (chosen?.type === "select" && graph.actions.some(({ key }) => key === chosen.id))
+            onSelect?.(chosen.id);
           const sized = changes.filter((change) => change.type === "dimensions");
           if (sized.length === 0) return;
           setMeasured((before) => {
@@ -82,7 +89,13 @@ export function GraphView(props: Props) {
         nodesDraggable={false}
         nodesConnectable={false}
         panActivationKeyCode={null} // the space key plays the replay
-        edgesFocusable={false}
+        edgesFocusable={onSelectArrow !== undefined}
+        onEdgeClick={(_, { data }) => data && onSelectArrow?.(data.relation)}
+        onEdgesChange={(changes) => {
+          const chosen = changes.find((each) => each.type === "select" && each.selected);
+          const arrow = edges.find(({ id }) => chosen?.type === "select" && id === chosen.id);
+          if (arrow?.data) onSelectArrow?.(arrow.data.relation);
+        }}
         fitView={!led}
         onlyRenderVisibleElements={led && nodes.length > LARGE}
         // A move without an event was made by the page.

@@ -176,6 +176,8 @@ interface EditorSummary {
   /** A start asks for values: `needs` those without which it cannot be; else it has them. */
   asks: "" | "may" | "needs";
   selected: string | null;
+  /** The only chosen action or arrow. */
+  point: string | null;
   pick: (aid: string) => void;
   /** Adds an action where there is room. */
   place: (template: NewAction) => void;
@@ -267,6 +269,7 @@ function useSummary(
         : "",
     onPlacing: setPlacing,
     selected,
+    point: context.selection.size === 1 ? ([...context.selection][0] ?? null) : null,
     pick: (aid) => {
       context.select([aid]);
       context.view.show([aid]);

@@ -11,9 +11,12 @@ import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../api/review";
 import { type Run, useRun } from "../api/runs";
+import { EditorStore, EditorStoreProvider } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
 import { serverTimeOf } from "../clock/server-clock";
+import { runMarks } from "../graph/breakpoints";
+import type { Key } from "../graph/model";
 import { RunQuestions } from "../status/held-notice";
 import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
 import { Timeline, type Track } from "../status/lanes/timeline";
@@ -21,6 +24,7 @@ import { INTO } from "../status/level-places";
 import { runEndText, runLabel, useRunStatus } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
 import { RestList } from "../status/rest-list";
+import { RunPoint } from "../status/run-point";
 import { useUnsure } from "../status/silence";
 import { StartedWith } from "../status/started-with";
 import { StateLabel } from "../status/state-label";
@@ -192,6 +196,43 @@ const RunCanvas = memo(function RunCanvas(props: Parameters<typeof GraphView>[0]
   );
 });
 
+/** The arrow that is chosen, if no action is; a chosen action takes its place. */
+function usePicked({ key, levels, select: choose }: LevelCursor) {
+  const [arrow, setArrow] = useState<string | null>(null);
+  const place = `${levels.join("\n")} ${key}`;
+  const [before, setBefore] = useState(place);
+  if (place !== before) {
+    setBefore(place);
+    if (key !== null) setArrow(null);
+  }
+  const pickArrow = useCallback(
+    (id: string) => {
+      choose(null);
+      setArrow(id);
+    },
+    [choose],
+  );
+  const select = useCallback(
+    (chosen: Key | null) => {
+      setArrow(null);
+      choose(chosen);
+    },
+    [choose],
+  );
+  return { arrow, pickArrow, select };
+}
+
+/** Return a store that marks where the run waits, on the graph that was sent with it. */
+function useRunMarks({ breakpoints }: Run, { graph, levels }: LevelCursor): EditorStore {
+  const [store] = useState(() => new EditorStore());
+  const isTop = levels.length === 0;
+  useEffect(
+    () => store.breakpoints.set(runMarks(graph, (isTop && breakpoints) || [])),
+    [store, graph, isTop, breakpoints],
+  );
+  return store;
+}
+
 interface RunTimelineProps {
   newest: Run;
   replay: ReplayCursor;
@@ -269,7 +310,11 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const mates = useTracks(runner, newest);
   const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);
   const [again, setAgain] = useState<RepeatActions | null>(null);
-  const picked = useMemo(() => new Set(level.key === null ? [] : [level.key]), [level.key]);
+  const { arrow, pickArrow, select } = usePicked(level);
+  const point = arrow ?? level.key;
+  const picked = useMemo(() => new Set(point === null ? [] : [point]), [point]);
+  const store = useRunMarks(newest, level);
+  const isLedNow = Boolean(newest.robots) && goes && level.levels.length === 0;
   const replayData = useReplayData(runner, newest.id, 0, true).data;
   const label = useVersionLabel(newest);
   const show = (at: number, fact: string | null) => {
@@ -293,18 +338,22 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         <div className={style.why}>
           <StartedWith run={newest} />
           <RunQuestions run={newest} />
+          {isLedNow && !past && <RunPoint run={newest} graph={level.graph} id={point} />}
           <RestList run={newest} />
           <FailureCauses runner={runner} run={newest} onShow={show} />
         </div>
         <section className={style.canvas} aria-label="Graph of the run">
-          <RunCanvas
-            key={level.levels.join("\n")}
-            graph={level.graph}
-            progress={progress}
-            selected={picked}
-            onSelect={level.select}
-            label={canvasLabel(newest, level, label)}
-          />
+          <EditorStoreProvider store={store}>
+            <RunCanvas
+              key={level.levels.join("\n")}
+              graph={level.graph}
+              progress={progress}
+              selected={picked}
+              onSelect={select}
+              onSelectArrow={isLedNow ? pickArrow : undefined}
+              label={canvasLabel(newest, level, label)}
+            />
+          </EditorStoreProvider>
           <LevelBar level={level} name={newest.graph_name} />
         </section>
         <RunTimeline

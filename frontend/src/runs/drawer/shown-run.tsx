@@ -14,6 +14,7 @@ import { Timeline, type Track } from "../../status/lanes/timeline";
 import { runLabel, type Tone } from "../../status/progress";
 import { RestList } from "../../status/rest-list";
 import { knownRest, type RobotRest, restWords } from "../../status/rests";
+import { RunPoint } from "../../status/run-point";
 import { StartedWith } from "../../status/started-with";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
@@ -36,6 +37,8 @@ export interface ShownRunProps {
   graph: Graph;
   versionLabel: string;
   selected: string | null;
+  /** The only chosen action or arrow. */
+  point: string | null;
   onPick: (aid: string) => void;
   /** The moment of the run that the canvas shows, ms; null for the present. */
   cursor: number | null;
@@ -119,6 +122,7 @@ export function ShownRun(props: ShownRunProps) {
       />
       {folded !== true && <StartedWith run={run} />}
       <RunQuestions run={run} />
+      {cursor === null && <RunPoint run={run} graph={sent} id={props.point} />}
       <RobotRests run={run} />
       {!inLine && (
         <p
