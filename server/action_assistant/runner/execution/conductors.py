@@ -33,6 +33,7 @@ from action_assistant.runner.runs.events import (
     MovesAgain,
     PieceBegan,
     PieceEnded,
+    PieceWaits,
     PlayBegan,
     Published,
     Requested,
@@ -275,6 +276,8 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
             match decode(stored.kind, stored.body):
                 case Published(at=at):
                     began = at
+                case PieceWaits(call=call, node=node):
+                    calls[call] = node
                 case PieceBegan(call=call, piece=piece, node=node):
                     calls[call] = node
                     noted.add(piece)

@@ -73,6 +73,8 @@ class LeadingEngine:
         self._course: list[tuple[float, CourseStep]] = (
             list(left.course.steps) if left is not None else []
         )
+        #: The full names of the actions of the calls that were reported, by number.
+        self._calls = dict(left.calls) if left is not None else dict[int, str]()
         #: The calls that have an outcome, or that the engine plays: another engine asks for none.
         self._over = {step.number for _, step in self._course if not isinstance(step, Stopped)}
 
@@ -157,6 +159,8 @@ class LeadingEngine:
         await self._engine.aclose()
 
     def _pass_on(self, report: Report) -> None:
+        if isinstance(report, CallBegan):
+            self._calls[report.call.number] = report.call.node
         match report:
             case CallBegan(call=call) if call.number in self._over:
                 return
@@ -190,7 +194,9 @@ class LeadingEngine:
         """Give a new engine what has happened so far. If that fails, hold the run and replace it."""
         known = len(self._course)
         try:
-            course = LedCourse(began=self._began, steps=tuple(self._course))
+            course = LedCourse(
+                began=self._began, steps=tuple(self._course), calls=dict(self._calls)
+            )
             await self._engine.take_up(order_of(self._first), course)
             self._is_where_the_run_is = True
             for _, step in self._course[known:]:

@@ -222,13 +222,13 @@ class SimulatorLink:
         """Give the engine the end (outcome and outputs) of a call that a robot carried out. Does
         nothing if the engine has crashed or hangs."""
         if self._dead is None:
-            self._tell(self._engine.returned(returned, self._now()))
+            self._tell(self._engine.returned(self._owned(returned), self._now()))
 
     async def play(self, number: int) -> None:
         """Let the script play the call with this number from now on. Does nothing if the engine has
         crashed or hangs."""
         if self._dead is None:
-            self._tell(self._engine.play(number, self._now()))
+            self._tell(self._engine.play(self._own(number), self._now()))
 
     async def take_up(self, order: Order, course: LedCourse) -> None:
         """Start the graph in `order` and bring it to the point that an earlier engine had reached
@@ -238,6 +238,8 @@ class SimulatorLink:
         name = order.graph.name
         self._runs[name] = order.run
         self._engine.library = {**self._engine.library, **_inside(order)}
+        if isinstance(self._performer, LedCalls):
+            self._performer.expect(course.calls)
         newest_ms = max((at_ms for at_ms, _ in course.steps), default=0.0)
         # A clock that was set back must not leave the engine behind its own past.
         elapsed_us = max(0, self._clock_us() - course.began, round(newest_ms * 1000))
@@ -254,9 +256,9 @@ class SimulatorLink:
             past_ms = at_ms = max(past_ms, at_ms, self._engine.now)
             match step:
                 case Returned():
-                    self._engine.returned(step, at_ms)
+                    self._engine.returned(self._owned(step), at_ms)
                 case Played(number=number):
-                    self._engine.play(number, at_ms)
+                    self._engine.play(self._own(number), at_ms)
                 case Stopped():
                     self._engine.stop(name, at_ms)
         past = self._performer.news() if isinstance(self._performer, LedCalls) else []
@@ -276,6 +278,13 @@ class SimulatorLink:
                     pass
         for each in self._performer.news() if isinstance(self._performer, LedCalls) else ():
             self._subscribers.tell(each)
+
+    def _own(self, number: int) -> int:
+        """Return the number in this engine of a call, by the one by which it is known."""
+        return self._performer.own(number) if isinstance(self._performer, LedCalls) else number
+
+    def _owned(self, returned: Returned) -> Returned:
+        return msgspec.structs.replace(returned, number=self._own(returned.number))
 
     def _require_call(self, step: CourseStep) -> None:
         """Let the engine go on until the call of a step of its course has begun, which a clock may
