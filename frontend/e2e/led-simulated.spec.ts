@@ -50,6 +50,7 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   await page.getByRole("button", { name: "Choose where to start" }).click();
   await expect(led).toBeChecked();
   await expect(dialog(page)).toContainText("Only the simulator plays: nothing moves.");
+  await expect(dialog(page)).not.toContainText("When a robot does not answer");
   await expect(dialog(page)).toContainText("The run waits at 1 breakpoint.", { timeout: 15_000 });
   await expect(start).toBeEnabled({ timeout: 15_000 });
   await holdEnter(page, start);

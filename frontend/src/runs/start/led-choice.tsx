@@ -170,6 +170,8 @@ export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps
       disabled: why !== "",
     };
   });
+  // Where only the simulator plays nobody can be lost.
+  const moves = Object.values(cast).some((player) => player !== SIMULATOR);
   const off = now.engines.filter(({ led, simulated }) => !simulated && !led);
   return (
     <>
@@ -194,22 +196,24 @@ export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps
           </Text>
         )}
       </fieldset>
-      <fieldset className={style.part}>
-        <legend>When a robot does not answer, or its action cannot begin</legend>
-        <div className={style.lost}>
-          {LOST.map(([value, words]) => (
-            <label key={value} className="finger">
-              <input
-                type="radio"
-                name="lost"
-                checked={lost === value}
-                onChange={() => onLost(value)}
-              />
-              {words}
-            </label>
-          ))}
-        </div>
-      </fieldset>
+      {moves && (
+        <fieldset className={style.part}>
+          <legend>When a robot does not answer, or its action cannot begin</legend>
+          <div className={style.lost}>
+            {LOST.map(([value, words]) => (
+              <label key={value} className="finger">
+                <input
+                  type="radio"
+                  name="lost"
+                  checked={lost === value}
+                  onChange={() => onLost(value)}
+                />
+                {words}
+              </label>
+            ))}
+          </div>
+        </fieldset>
+      )}
     </>
   );
 }
