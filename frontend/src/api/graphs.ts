@@ -23,6 +23,7 @@ export const queryKeys = {
   graphs: ["graphs"] as const,
   pages: ["graph pages"] as const,
   names: ["graph names"] as const,
+  thumbnail: (graph: string) => ["graph thumbnails", graph] as const,
   labels: ["graph labels"] as const,
   deleted: ["deleted graphs"] as const,
   folders: ["folders"] as const,

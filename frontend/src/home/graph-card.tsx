@@ -67,7 +67,9 @@ export function GraphCard({ graph, last, place }: GraphCardProps) {
     <article className={home.card} style={nameColors(robots)}>
       <Link to={`/graphs/${graph.id}`} className="block ink-inherit no-underline">
         <div className={home.preview}>
-          {graph.actions !== 0 && <GraphPreview graph={graph.id} seq={graph.seq} />}
+          {graph.actions !== 0 && (
+            <GraphPreview graph={graph.id} digest={graph.thumbnail ?? undefined} />
+          )}
           <People people={people} />
         </div>
         <div className={home.body}>

@@ -1,11 +1,9 @@
 /** A graph in miniature: cards as blocks, arrows as lines in the colours of their outcomes. */
-import { useQuery } from "@tanstack/react-query";
 import { useEffect, useMemo, useRef, useState } from "react";
-import { graphText } from "../api/graphs";
-import { fromUmrf } from "../canvas/from-umrf";
-import { arrange } from "../canvas/geometry/arrange";
-import { outcomeColor } from "../canvas/outcome";
-import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../graph/model";
+import { type Thumbnail, useThumbnail } from "../api/thumbnails";
+import { arrangedByRank } from "../canvas/geometry/arrange";
+import { OUTCOMES, outcomeColor } from "../canvas/outcome";
+import { ENTRY, EXIT } from "../graph/model";
 import { colorOfName } from "../ui/name-colors";
 
 const NEAR = "200px 0px";
@@ -20,19 +18,49 @@ interface MiniatureBox {
   height: number;
 }
 
-function boxes(graph: Graph): Map<string, MiniatureBox> {
-  const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
-  const sizes = new Map(keys.map((key) => [key, key === ENTRY || key === EXIT ? PILL : CARD]));
-  const found = new Map<string, MiniatureBox>();
-  for (const [key, [x, y]] of arrange(graph, sizes, "right")) {
-    found.set(key, { x, y, ...(sizes.get(key) ?? CARD) });
-  }
-  return found;
+interface MiniatureCard {
+  robot: string;
+  letters: number;
 }
 
-function Miniature({ graph }: { graph: Graph }) {
-  const places = useMemo(() => boxes(graph), [graph]);
-  const all = [...places.values()];
+interface MiniatureArrow {
+  id: string;
+  parent: string;
+  child: string;
+  color: string;
+}
+
+interface MiniatureOf {
+  boxes: ReadonlyMap<string, MiniatureBox>;
+  cards: ReadonlyMap<string, MiniatureCard>;
+  arrows: readonly MiniatureArrow[];
+}
+
+/** Return what is drawn for a thumbnail, at its places. */
+export function miniatureOf({ robots, actions, arrows }: Thumbnail): MiniatureOf {
+  const cards = new Map<string, MiniatureCard>(
+    actions.map(([robot, letters], i) => [`${i + 1}`, { robot: robots[robot] ?? "", letters }]),
+  );
+  const keys = [ENTRY, ...cards.keys(), EXIT];
+  const drawn = arrows.map(([from, to, outcome], i) => {
+    const parent = keys[from] ?? "";
+    const color = outcomeColor[OUTCOMES[outcome] ?? "on_true"];
+    const id = `${parent}>${keys[to]};${i}`;
+    return { id, parent, child: keys[to] ?? "", color: parent === ENTRY ? "var(--ink4)" : color };
+  });
+  const sizes = new Map(keys.map((key) => [key, cards.has(key) ? CARD : PILL]));
+  const relations = drawn.map((arrow, i) => ({ ...arrow, parentOrder: 0, listing: i }));
+  const graph = { actions: [...cards.keys()].map((key) => ({ key })), relations };
+  const boxes = new Map<string, MiniatureBox>();
+  for (const [key, [x, y]] of arrangedByRank(graph, sizes, "right")) {
+    boxes.set(key, { x, y, ...(sizes.get(key) ?? CARD) });
+  }
+  return { boxes, cards, arrows: drawn };
+}
+
+function Miniature({ thumbnail }: { thumbnail: Thumbnail }) {
+  const { boxes, cards, arrows } = useMemo(() => miniatureOf(thumbnail), [thumbnail]);
+  const all = [...boxes.values()];
   const left = Math.min(...all.map((box) => box.x)) - MARGIN;
   const top = Math.min(...all.map((box) => box.y)) - MARGIN;
   const right = Math.max(...all.map((box) => box.x + box.width)) + MARGIN;
@@ -45,18 +73,16 @@ function Miniature({ graph }: { graph: Graph }) {
       aria-hidden
       focusable="false"
     >
-      {graph.relations.map((relation) => {
-        const from = places.get(relation.parent);
-        const to = places.get(relation.child);
+      {arrows.map(({ id, parent, child, color }) => {
+        const from = boxes.get(parent);
+        const to = boxes.get(child);
         if (!from || !to) return null;
         const [x1, y1] = [from.x + from.width, from.y + from.height / 2];
         const [x2, y2] = [to.x, to.y + to.height / 2];
         const bend = Math.max(30, Math.abs(x2 - x1) / 2);
-        const outcome = spokenOutcomes(relation.conditions)[0] ?? "on_true";
-        const color = relation.parent === ENTRY ? "var(--ink4)" : outcomeColor[outcome];
         return (
           <path
-            key={`${relation.parent}>${relation.child};${relation.listing}`}
+            key={id}
             d={`M${x1} ${y1}C${x1 + bend} ${y1} ${x2 - bend} ${y2} ${x2} ${y2}`}
             fill="none"
             strokeWidth={5}
@@ -64,21 +90,20 @@ function Miniature({ graph }: { graph: Graph }) {
           />
         );
       })}
-      {[...places].map(([key, box]) => {
-        const end = key === ENTRY || key === EXIT;
-        const action = graph.actions.find((candidate) => candidate.key === key);
+      {[...boxes].map(([key, box]) => {
+        const card = cards.get(key);
         return (
           <g key={key}>
             <rect
               {...box}
-              rx={end ? 22 : 16}
+              rx={card ? 16 : 22}
               strokeWidth={4}
               style={{
                 fill: "var(--raised)",
                 stroke: key === ENTRY ? "var(--true)" : "var(--line2)",
               }}
             />
-            {action && (
+            {card && (
               <>
                 <rect
                   x={box.x + 12}
@@ -86,12 +111,12 @@ function Miniature({ graph }: { graph: Graph }) {
                   width={7}
                   height={box.height - 36}
                   rx={3}
-                  style={{ fill: colorOfName(action.actor) }}
+                  style={{ fill: colorOfName(card.robot) }}
                 />
                 <rect
                   x={box.x + 32}
                   y={box.y + 24}
-                  width={Math.min(100, 14 + action.name.length * 6)}
+                  width={Math.min(100, 14 + card.letters * 6)}
                   height={11}
                   rx={5}
                   style={{ fill: "var(--ink4)" }}
@@ -113,8 +138,8 @@ function Miniature({ graph }: { graph: Graph }) {
   );
 }
 
-/** Reads a graph once it comes near the screen: of a long list that are the first few. */
-export function GraphPreview({ graph, seq }: { graph: string; seq: number }) {
+/** Reads a thumbnail once it comes near the screen: of a long list that are the first few. */
+export function GraphPreview({ graph, digest }: { graph: string; digest: string | undefined }) {
   const frame = useRef<HTMLDivElement>(null);
   const [isNear, setNear] = useState(false);
   useEffect(() => {
@@ -124,17 +149,10 @@ export function GraphPreview({ graph, seq }: { graph: string; seq: number }) {
     if (frame.current) near.observe(frame.current);
     return () => near.disconnect();
   }, []);
-  const umrf = useQuery({
-    enabled: isNear,
-    queryKey: ["graphs", graph, "umrf", seq],
-    queryFn: () => graphText(graph).then((text) => JSON.parse(text) as unknown),
-    staleTime: Number.POSITIVE_INFINITY,
-    retry: false,
-  });
-  const drawn = useMemo(() => (umrf.data === undefined ? null : fromUmrf(umrf.data)), [umrf.data]);
+  const thumbnail = useThumbnail(graph, isNear ? digest : undefined);
   return (
     <div ref={frame} className="block h-full">
-      {drawn !== null && drawn.actions.length > 0 && <Miniature graph={drawn} />}
+      {thumbnail && <Miniature thumbnail={thumbnail} />}
     </div>
   );
 }

@@ -398,3 +398,67 @@ def test_the_routes_answer_pages_names_and_labels(http: httpx.Client) -> None:
 )
 def test_a_page_that_cannot_be_is_refused(http: httpx.Client, query: str) -> None:
     assert http.get(f"/api/graphs?{query}").status_code == 400
+
+
+async def thumbnails(services: Opened, identity: Identity = ANN) -> dict[str, str]:
+    """Return the digests of the thumbnails of the graphs on the first page, by the ids of graphs."""
+    page = await services.pages.page(identity, Wanted(), limit=200)
+    return {view.id: view.thumbnail for view in page.graphs if view.thumbnail is not None}
+
+
+async def test_after_a_restart_lists_have_thumbnails_and_read_no_document(
+    database: Database,
+) -> None:
+    async with database.opened() as services:
+        await bring(services, "one")
+        await bring(services, "empty", actions=[])
+        before = await thumbnails(services)
+        assert len(before) == 1
+    async with database.opened() as services:
+        assert await thumbnails(services) == before
+        found = await services.pages.thumbnails(ANN, before)
+        assert [{each.graph: each.digest} for each in found] == [before]
+        assert services.documents == 0
+
+
+async def test_a_thumbnail_has_another_digest_only_if_what_it_shows_has_changed(
+    services: Opened,
+) -> None:
+    graph = await bring(services, "one")
+    before = await thumbnails(services)
+    await services.catalogue.describe(graph, "ann", name="two", description="another")
+    assert await thumbnails(services) == before
+    await services.catalogue.call_uses([graph], NAV["actions"][0]["name"], "Goes elsewhere", "ann")
+    after = await thumbnails(services)
+    assert after[graph] != before[graph]
+    assert await services.pages.thumbnails(ANN, before) == ()
+    assert len(await services.pages.thumbnails(ANN, after)) == 1
+
+
+async def test_nobody_gets_the_thumbnail_of_a_graph_out_of_sight_by_its_digest(
+    services: Opened,
+) -> None:
+    mine = (await services.catalogue.bring(json.dumps(NAV).encode(), "ann", rule=MINE))[0].id
+    public = await bring(services, "public", actions=NAV["actions"][:1])
+    await services.rights.refresh()
+    digests = await thumbnails(services)
+    assert set(digests) == {mine, public}
+    assert set(await thumbnails(services, BEN)) == {public}
+    stolen = {mine: digests[mine], public: digests[mine]}
+    assert await services.pages.thumbnails(BEN, stolen) == ()
+    found = await services.pages.thumbnails(BEN, digests)
+    assert [each.graph for each in found] == [public]
+
+
+def test_only_a_complete_answer_with_thumbnails_may_be_kept(http: httpx.Client) -> None:
+    graph = http.post("/api/graphs", json=NAV).json()["id"]
+    digest = http.get("/api/graphs", params={"limit": 9}).json()[0]["thumbnail"]
+    right = http.get("/api/graphs/thumbnails", params={"of": f"{graph}.{digest}"})
+    assert [each["graph"] for each in right.json()] == [graph]
+    assert "immutable" in right.headers["cache-control"]
+    assert "private" in right.headers["cache-control"]
+    assert "cookie" in right.headers["vary"]
+    for other in (f"{graph}.0", f"nothing.{digest}"):
+        wrong = http.get("/api/graphs/thumbnails", params={"of": [f"{graph}.{digest}", other]})
+        assert wrong.headers["cache-control"] == "no-store"
+    assert http.get("/api/graphs/thumbnails", params={"of": digest}).status_code == 400

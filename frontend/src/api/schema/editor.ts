@@ -906,7 +906,7 @@ export interface EditorApi {
      *     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
      *     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
      *     its drafts. `folder`: the id of the folder in which it lies. `restricted`: not everybody may see
-     *     or edit it.
+     *     or edit it. `thumbnail`: the digest of its thumbnail, which `GET /api/graphs/thumbnails` gives.
      */
     GraphView: {
         id: string;
@@ -940,6 +940,7 @@ export interface EditorApi {
         folder?: string;
         /** @default false */
         restricted?: boolean;
+        thumbnail?: string;
     };
     /**
      * Group
@@ -1336,6 +1337,7 @@ export interface EditorApi {
         folder?: string;
         /** @default false */
         restricted?: boolean;
+        thumbnail?: string;
         reading?: EditorApi["ImportReport"];
     };
     /**
@@ -2428,6 +2430,34 @@ export interface EditorApi {
         problems: EditorApi["Problem"][];
     };
     /**
+     * Thumbnail
+     * @description A graph as its thumbnail shows it. `actions`: the index of the robot in `robots`, -1 for none,
+     *     and the length of the name; `arrows`: where each begins and ends, and the first outcome at which
+     *     it leads on, as an index in `PRECONDITIONS`. An end of an arrow is 0 for the entry, the number
+     *     of an action from 1, or after the last one the exit.
+     */
+    Thumbnail: {
+        robots: string[];
+        actions: [
+            number,
+            number
+        ][];
+        arrows: [
+            number,
+            number,
+            number
+        ][];
+    };
+    /**
+     * ThumbnailOf
+     * @description The thumbnail of the graph with this id, as the list names it by its `digest`.
+     */
+    ThumbnailOf: {
+        graph: string;
+        digest: string;
+        thumbnail: EditorApi["Thumbnail"];
+    };
+    /**
      * TokenList
      * @description The tokens of a server. `most_days`: the longest life that a new one may get.
      */
@@ -2723,6 +2753,9 @@ export interface EditorPaths {
     };
     "/api/graphs/labels": {
         get: EditorOperations["listGraphLabels"];
+    };
+    "/api/graphs/thumbnails": {
+        get: EditorOperations["listThumbnails"];
     };
     "/api/graphs/{graph_id}": {
         get: EditorOperations["getGraph"];
@@ -3469,6 +3502,20 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["LabelCount"][];
+                };
+            };
+        };
+    };
+    listThumbnails: {
+        parameters: {
+            query: {
+                of: string[];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ThumbnailOf"][];
                 };
             };
         };

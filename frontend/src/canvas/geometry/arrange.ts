@@ -68,8 +68,14 @@ function sizeOf(key: Key, sizes: Sizes, direction: Direction): Size {
   return sizes.get(key) ?? (key === ENTRY || key === EXIT ? pillSize(direction) : CARD);
 }
 
+/** The actions and arrows of a graph, as far as simple places depend on them. */
+export interface Connected {
+  readonly actions: readonly Pick<Action, "key">[];
+  readonly relations: readonly Pick<Relation, "parent" | "child" | "parentOrder" | "listing">[];
+}
+
 /** Return the index of every element in the order of the file, from the entry to the exit. */
-export function orderOf(graph: Graph): Map<Key, number> {
+export function orderOf(graph: Connected): Map<Key, number> {
   return new Map([ENTRY, ...graph.actions.map(({ key }) => key), EXIT].map((key, i) => [key, i]));
 }
 
@@ -77,7 +83,10 @@ export function orderOf(graph: Graph): Map<Key, number> {
  * Return the relations in the order of the file, without those of an action to itself. It does not
  * depend on keys, which are random.
  */
-export function relationsInOrder(graph: Graph, order = orderOf(graph)): Relation[] {
+export function relationsInOrder<G extends Connected>(
+  graph: G,
+  order = orderOf(graph),
+): G["relations"][number][] {
   const at = (key: Key) => order.get(key) ?? 0;
   return graph.relations
     .filter(({ parent, child }) => parent !== child && order.has(parent) && order.has(child))
@@ -94,7 +103,7 @@ export function relationsInOrder(graph: Graph, order = orderOf(graph)): Relation
  * Return the successors of each element, without arrows that lead back (into an element on the
  * current path) and arrows to the exit.
  */
-export function forward(graph: Graph): Map<Key, Key[]> {
+export function forward(graph: Connected): Map<Key, Key[]> {
   const all = new Map<Key, Key[]>([[ENTRY, []]]);
   for (const { key } of graph.actions) all.set(key, []);
   for (const { parent, child } of relationsInOrder(graph)) {
@@ -127,7 +136,7 @@ export function forward(graph: Graph): Map<Key, Key[]> {
 }
 
 /** Return the rank of each element: greater than the ranks of all elements that lead to it. */
-export function ranksOf(graph: Graph): Map<Key, number> {
+export function ranksOf(graph: Connected): Map<Key, number> {
   const next = forward(graph);
   const waiting = new Map<Key, number>([...next.keys()].map((key) => [key, 0]));
   for (const children of next.values()) {
@@ -149,15 +158,13 @@ export function ranksOf(graph: Graph): Map<Key, number> {
   return ranks;
 }
 
-/**
- * Return simple places: one row or column for each rank, centred. They serve as miniatures and
- * until the layout is ready.
- */
-export function arrange(
-  graph: Graph,
-  sizes: Sizes = estimatedSizes(graph),
-  direction: Direction = graph.direction,
-): Positions {
+/** Return the simple places of a graph, which serve until its layout is ready. */
+export function arrange(graph: Graph, sizes: Sizes = estimatedSizes(graph)): Positions {
+  return arrangedByRank(graph, sizes, graph.direction);
+}
+
+/** Return simple places: one row or column for each rank, centred. They serve for thumbnails, too. */
+export function arrangedByRank(graph: Connected, sizes: Sizes, direction: Direction): Positions {
   const rows: Key[][] = [];
   for (const [key, rank] of ranksOf(graph)) {
     rows[rank] ??= [];

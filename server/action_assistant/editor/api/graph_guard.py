@@ -31,6 +31,7 @@ FILTERED: Final = frozenset(
         "/api/graphs",
         "/api/graphs/names",
         "/api/graphs/labels",
+        "/api/graphs/thumbnails",
         "/api/folders",
         "/api/events",
         "/api/actions",

@@ -9,7 +9,12 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.catalogue import graph_pages
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.catalogue.graph_pages import GraphName, LabelCount, Wanted
+from action_assistant.editor.catalogue.graph_pages import (
+    GraphName,
+    LabelCount,
+    ThumbnailOf,
+    Wanted,
+)
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange import importing
@@ -35,8 +40,10 @@ Limit: TypeAlias = Annotated[int | None, Parameter(ge=1, le=graph_pages.MOST)]
 Offset: TypeAlias = Annotated[int, Parameter(ge=0, le=MOST_NUMBER)]
 Search: TypeAlias = Annotated[str, Parameter(max_length=200)]
 First: TypeAlias = Annotated[list[str] | None, QueryParameter(max_items=graph_pages.MOST_FIRST)]
+Drawn: TypeAlias = Annotated[list[str], QueryParameter(max_items=graph_pages.MOST_DRAWN)]
 
 _TOLD: Final = 50  # keys of a conflict that an answer lists
+_LASTING: Final = "private, max-age=31536000, immutable"
 
 
 class MadeGraph(GraphView, frozen=True, omit_defaults=True):
@@ -163,7 +170,31 @@ def _lists(app_state: EditorState) -> list[ControllerRouterHandler]:
         wanted = Wanted(folder=folder, deep=deep)
         return await app_state.services.graph_pages.labels(identity_of(request), wanted)
 
-    return [list_graphs, list_names, list_labels]
+    @get(
+        "/api/graphs/thumbnails",
+        summary="Thumbnails of graphs, each named in `of` by its id, a dot and the digest that the list "
+        "shows; those that have another digest now are left out",
+        operation_id="listThumbnails",
+        guards=[Needs("see")],
+    )
+    async def list_thumbnails(request: Asking, of: Drawn) -> Response[tuple[ThumbnailOf, ...]]:
+        wanted = dict(_graph_and_digest(each) for each in of)
+        found = await app_state.services.graph_pages.thumbnails(identity_of(request), wanted)
+        # The address says what is answered, to those who may see it, unless something is left out.
+        kept = _LASTING if len(found) == len(wanted) else "no-store"
+        return Response(found, headers={"cache-control": kept, "vary": "cookie, authorization"})
+
+    return [list_graphs, list_names, list_labels, list_thumbnails]
+
+
+def _graph_and_digest(text: str) -> tuple[str, str]:
+    graph, dot, digest = text.rpartition(".")
+    if not dot:
+        raise BadInput(
+            f"A thumbnail is named by a graph, a dot and a digest, and not {text!r}.",
+            where={"path": "/of"},
+        )
+    return graph, digest
 
 
 async def _whole_list(

@@ -52,7 +52,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
     its drafts. `folder`: the id of the folder in which it lies. `restricted`: not everybody may see
-    or edit it.
+    or edit it. `thumbnail`: the digest of its thumbnail, which `GET /api/graphs/thumbnails` gives.
     """
 
     id: str
@@ -75,6 +75,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     drafts: int = 0
     folder: str | None = None
     restricted: bool = False
+    thumbnail: str | None = None
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -380,6 +381,7 @@ class Catalogue:
             else DraftOf(row.draft_of, row.drafted_seq, row.draft_name),
             drafts=row.drafts,
             folder=row.folder,
+            thumbnail=summary.thumbnail,
         )
 
 

@@ -14,6 +14,7 @@ from action_assistant.editor.catalogue.graph_names import GraphNames, NamedGraph
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents, document
 from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo, Inside
+from action_assistant.editor.documents.thumbnails import digest_of
 from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Forbidden, NotFound, Refused
@@ -36,7 +37,8 @@ _INSIDE: Final = 200
 
 class GraphSummary(msgspec.Struct, frozen=True):
     """The facts about a graph that lists show. `damaged`: the first change that cannot be read. `first`: name
-    and description of its first action. A field is None where finding it out would take too long."""
+    and description of its first action. `thumbnail`: the digest of its thumbnail. A field is None
+    where finding it out would take too long, or where there is none."""
 
     seq: int
     name: str | None = None
@@ -48,6 +50,7 @@ class GraphSummary(msgspec.Struct, frozen=True):
     labels: tuple[str, ...] = ()
     damaged: int | None = None
     first: tuple[str, str] | None = None
+    thumbnail: str | None = None
 
     def called(self, kind: DocumentKind) -> tuple[str | None, str | None]:
         """Return the name and the description of a document; for a library document those of its
@@ -424,4 +427,5 @@ def _summary(
         info.labels,
         about.seq + 1 if about.seq < newest else None,
         info.first,
+        digest_of(info.thumbnail),
     )

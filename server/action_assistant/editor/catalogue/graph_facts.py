@@ -30,6 +30,7 @@ log: Final = logging.getLogger(__name__)
 
 _REMEMBERED: Final = 20_000  # graphs
 _NAMES: Final = 500_000  # of actions, over all graphs that are remembered
+_AS_A_NAME: Final = 64  # bytes of a thumbnail that count as one name
 _ROWS: Final = 200  # in one query or transaction
 _PERIOD: Final = 1.0  # seconds between two transactions
 #: The code on which the facts depend.
@@ -150,7 +151,8 @@ class GraphFacts:
     def _put(self, graph: str, facts: Facts) -> Facts:
         uses = tuple(map(sys.intern, facts.info.uses))  # most graphs use the same actions
         info = msgspec.structs.replace(facts.info, uses=uses)
-        return self._known.put(graph, msgspec.structs.replace(facts, info=info), len(uses))
+        weight = len(uses) + len(info.thumbnail) // _AS_A_NAME
+        return self._known.put(graph, msgspec.structs.replace(facts, info=info), weight)
 
 
 @cache

@@ -5,7 +5,7 @@ brought up to date; a query never reads more documents than a page has graphs.
 """
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
@@ -16,8 +16,10 @@ from action_assistant.editor.catalogue.catalogue import READ_FOR_A_LIST, Catalog
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_facts import ChangedGraph
 from action_assistant.editor.catalogue.graph_rights import GraphRights
+from action_assistant.editor.documents.thumbnails import Thumbnail, digest_of
 from action_assistant.editor.log.graph_events import graph_of
 from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.workers import encoded
 from action_assistant.errors import NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import (
@@ -34,6 +36,7 @@ Order: TypeAlias = Literal["changed", "name", "problems", "size"]
 
 MOST: Final = 200  # graphs on a page
 MOST_FIRST: Final = 200  # graphs that may be named to come first
+MOST_DRAWN: Final = 60  # thumbnails of one answer
 _READ: Final = 60  # documents that a query waits for
 _WORDS: Final = 20  # of a search
 _AT_ONCE: Final = 400  # graphs that one query names
@@ -67,6 +70,14 @@ class GraphName(msgspec.Struct, frozen=True):
 
     id: str
     name: str
+
+
+class ThumbnailOf(msgspec.Struct, frozen=True):
+    """The thumbnail of the graph with this id, as the list names it by its `digest`."""
+
+    graph: str
+    digest: str
+    thumbnail: Thumbnail
 
 
 class LabelCount(msgspec.Struct, frozen=True):
@@ -136,6 +147,24 @@ class GraphPages:
             chosen.where(*conditions).order_by(facts.c.name_key, graph.c.id)
         )
         return tuple(GraphName(row.id, row.name) for row in rows)
+
+    async def thumbnails(
+        self, identity: Identity, wanted: Mapping[str, str]
+    ) -> tuple[ThumbnailOf, ...]:
+        """Return thumbnails of graphs, by their digests as lists show them. Graphs that are out of
+        sight, and those that have another digest, are left out. No document is read. Raise
+        Unavailable if the journal cannot be read."""
+        _, conditions = await self._conditions(identity, Wanted())
+        chosen = select(graph.c.id).where(*conditions, graph.c.id.in_(wanted))
+        seen = [row.id for row in await self._journal.query(chosen)]
+        await self._checks.facts.recall(seen)
+        known = [(each, self._checks.facts.get(each)) for each in seen]
+        drawn = [(each, facts.info.thumbnail) for each, facts in known if facts is not None]
+        return tuple(
+            ThumbnailOf(each, wanted[each], encoded(Thumbnail, json))
+            for each, json in drawn
+            if digest_of(json) == wanted[each]
+        )
 
     async def labels(self, identity: Identity, wanted: Wanted) -> tuple[LabelCount, ...]:
         """Return the labels of the wanted graphs, sorted by name. Raise NotFound as `page` does."""

@@ -12,6 +12,7 @@ from pycrdt import Doc
 from action_assistant.editor.documents import document
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
+from action_assistant.editor.documents.thumbnails import thumbnail
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.umrf.breakpoints import Breakpoint, breakpoints_in
 from action_assistant.umrf.check import check_written
@@ -82,7 +83,8 @@ class Counts(msgspec.Struct, frozen=True):
 class GraphInfo(msgspec.Struct, frozen=True):
     """The facts about a graph that lists show. `problems`, `told`: the problems found, and those
     that people should fix or fill in, both without the graphs inside. `first`: name and
-    description of its first action. `uses`: the names of its actions."""
+    description of its first action. `uses`: the names of its actions. `thumbnail`: the JSON of its
+    `Thumbnail`, empty for none."""
 
     name: str
     description: str
@@ -93,6 +95,7 @@ class GraphInfo(msgspec.Struct, frozen=True):
     labels: tuple[str, ...]
     first: tuple[str, str] | None = None
     uses: tuple[str, ...] = ()
+    thumbnail: bytes = b""
 
 
 class Read:
@@ -176,6 +179,7 @@ def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
         labels_of(graph),
         None if (action := first_action(graph)) is None else (action.name, action.description),
         uses_of(graph),
+        thumbnail(graph),
     )
 
 
