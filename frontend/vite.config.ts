@@ -8,8 +8,9 @@ import { defineConfig } from "vitest/config";
 // `npm run dev` forwards what the page asks of its server to an editor on this machine.
 const editor = process.env.ACTION_ASSISTANT_EDITOR ?? "http://127.0.0.1:8000";
 
-/** Vendor code in few files that change seldom, so that an upgrade of ours leaves them cached. */
-const vendors: { name: string; test: RegExp; tags?: "$initial"[] }[] = [
+/** Vendor code in few files that change seldom, so that an upgrade of ours leaves them cached; and what a
+ * screen needs before it is drawn in one file, since each request costs as much as kilobytes. */
+const chunks: { name: string; test: RegExp; tags?: "$initial"[]; minShareCount?: number }[] = [
   { name: "react", test: /node_modules\/(react|react-dom|scheduler|use-sync-external-store)\// },
   { name: "canvas", test: /node_modules\/(@xyflow|d3-|classcat|zustand)/ },
   { name: "sync", test: /node_modules\/(yjs|y-protocols|lib0)\// },
@@ -19,8 +20,33 @@ const vendors: { name: string; test: RegExp; tags?: "$initial"[] }[] = [
     test: /src\/(app\/stop-main|clock\/|words\/|runs\/stop\/(stop-|outside-)|api\/(live-socket|page-link|http|page-url|run-stop|session)|graph\/stop-basics|status\/help-link|ui\/(keys|times|tokens|watched|use-root-mark))/,
   },
   // What every page loads comes in one piece: it is smaller than in many, and asked for once.
-  { name: "ui", test: /node_modules\//, tags: ["$initial"] },
-  { name: "page", test: /src\/(?!offline\/(service-worker|requests))/, tags: ["$initial"] },
+  {
+    name: "page",
+    test: /(node_modules|src)\/(?!offline\/(service-worker|requests))/,
+    tags: ["$initial"],
+  },
+  // Drawn once the page is, on every screen.
+  { name: "start", test: /src\/(ui\/messages|account\/notifier)\.tsx$/ },
+  { name: "home", test: /src\/app\/home-screen\.tsx$/ },
+  // Small things of many screens, which are to need nothing of the editor.
+  {
+    name: "controls",
+    test: /node_modules\/(@tabler\/|@mantine\/core\/esm\/components\/(ActionIcon|Kbd|Text|Paper|CopyButton)\/)|src\/ui\/(copy-text|segments)/,
+    minShareCount: 3,
+  },
+  { name: "editor", test: /src\/app\/graph-screen\.tsx$/ },
+  // Menus, dialogs and forms, of several screens each.
+  {
+    name: "overlays",
+    test: /node_modules\/(?!@codemirror|@lezer|elkjs|mdast|micromark)/,
+    minShareCount: 4,
+  },
+  { name: "forms", test: /src\/(ui|graph|words|people)\//, minShareCount: 4 },
+  // What an editor loads once its graph is there.
+  {
+    name: "beside",
+    test: /src\/(?!review).*\/(level-status|draft-status|sent-graph|sidebar|draft-bar|inspector|levels|since-marks|graph-print|lost-drafts|arrow-dialog|quick-add|command-palette|context-menu|find-bar|graph-form|graph-map)\.tsx$/,
+  },
 ];
 
 /** In the page only: parts of libraries that are large, and of which it uses nothing that is large. */
@@ -182,7 +208,7 @@ export default defineConfig({
         "service-worker": resolve(import.meta.dirname, "src/offline/service-worker.ts"),
       },
       output: {
-        codeSplitting: { groups: vendors },
+        codeSplitting: { groups: chunks },
         // A worker reaches as far as the folder it lies in.
         entryFileNames: ({ name }) =>
           name === "service-worker" ? "[name].js" : "assets/[name]-[hash].js",

@@ -77,6 +77,7 @@ async function knock(): Promise<Gate> {
   }
 }
 
+const SETTLED = 10_000; // ms after which the first view is there
 const PATIENCE = 5_000; // ms until a device shows what it keeps
 
 /**
@@ -221,7 +222,9 @@ export function SignInGate({ children }: { children: ReactNode }) {
   useEffect(() => {
     if (gate.at !== "inside" || gate.offline) return;
     rememberPerson(gate.person);
-    void SignInBar.preload(); // when it is needed, the server may not answer
+    // When it is needed, the server may not answer.
+    const later = setTimeout(() => void SignInBar.preload(), SETTLED);
+    return () => clearTimeout(later);
   }, [gate]);
   useStopOf(gate);
   const hold = useMemo(

@@ -75,3 +75,6 @@ export function folderPath(folders: readonly Folder[], id: string | null | undef
     .map(({ name }) => name)
     .join(" / ");
 }
+
+/** Return the address of the first page with a folder; without one with the graphs that are in none. */
+export const placeOfFolder = (id: string | null | undefined) => (id ? `/?folder=${id}` : "/");

@@ -131,8 +131,9 @@ export function fetchGraphNames(client: QueryClient): Promise<readonly GraphName
 }
 
 /** The labels of the graphs in a folder and those inside of it; "" for all graphs. */
-export function useGraphLabels(folder: string) {
+export function useGraphLabels(folder: string, enabled: boolean) {
   return useQuery({
+    enabled,
     queryKey: [...queryKeys.labels, folder],
     queryFn: ({ signal }) =>
       editor.get("/api/graphs/labels", { query: { folder, deep: true }, signal }),

@@ -34,14 +34,6 @@ export const queryKeys = {
   version: (id: string) => ["versions", id] as const,
 };
 
-export function useGraphs() {
-  return useQuery({
-    queryKey: queryKeys.graphs,
-    queryFn: ({ signal }) => editor.get("/api/graphs", { signal }),
-    refetchInterval: 8_000,
-  });
-}
-
 /** Graphs that were deleted and can be brought back, those that changed last first. */
 export function useDeletedGraphs(wanted: boolean) {
   return useQuery({
@@ -129,7 +121,7 @@ export function recoverGraph(id: string): Promise<unknown> {
   return editor.post("/api/graphs/{graph_id}/recover", { path: inGraph(id) });
 }
 
-export function graphText(id: string): Promise<string> {
+function graphText(id: string): Promise<string> {
   return fetchText(`/api/graphs/${encodeURIComponent(id)}/umrf`);
 }
 

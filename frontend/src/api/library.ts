@@ -26,11 +26,15 @@ export function fetchLibrary(signal?: AbortSignal): Promise<LibraryAction[]> {
   return editor.get("/api/actions", { signal });
 }
 
+/** For how long an answer serves parts of the page that come after the one that has asked, ms. */
+const ASKED = 10_000;
+
 export function useLibrary() {
   return useQuery({
     queryKey: queryKeys.actions,
     queryFn: ({ signal }) => fetchLibrary(signal),
     refetchInterval: 15_000,
+    staleTime: ASKED,
   });
 }
 
@@ -54,6 +58,7 @@ export function useGraphsAsActions() {
     queryKey: [...queryKeys.actions, "graphs"],
     queryFn: ({ signal }) => editor.get("/api/actions/graphs", { signal }),
     refetchInterval: 30_000,
+    staleTime: ASKED,
   });
 }
 

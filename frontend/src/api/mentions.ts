@@ -20,6 +20,7 @@ export function useInbox() {
     queryKey: mentionsOf(person),
     queryFn: ({ signal }) => editor.get("/api/mentions", { signal }),
     refetchInterval: LOOK,
+    staleTime: LOOK / 2,
     refetchIntervalInBackground: true,
     retry: false,
   });

@@ -4,7 +4,8 @@
  */
 import { type NodeHandle, Position as Side } from "@xyflow/react";
 import { type Action, type Direction, ENTRY, type EXIT, type Key } from "../graph/model";
-import { cardSize, pillSize } from "./geometry/arrange";
+import { cardSize } from "./geometry/arrange";
+import { pillSize } from "./geometry/ranks";
 import { OUTCOMES } from "./outcome";
 
 type Extent = Readonly<{ width: number; height: number }>;

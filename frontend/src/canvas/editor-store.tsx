@@ -13,7 +13,7 @@ import type { Progress } from "../status/progress";
 import type { RunOnCanvas } from "../status/progress-inside";
 import { useWatched, Watched } from "../ui/watched";
 import type { Arrow, CanvasNode, Folding } from "./elements";
-import type { Positions, Size, Sizes } from "./geometry/arrange";
+import type { Positions, Size, Sizes } from "./geometry/ranks";
 import { BreakpointMark } from "./marks/breakpoint-mark";
 
 export interface InsideSignProps {

@@ -17,7 +17,7 @@ import {
   IconSitemap,
 } from "@tabler/icons-react";
 import { type Align, align, type Block, distribute } from "../canvas/geometry/align";
-import { CARD } from "../canvas/geometry/arrange";
+import { CARD } from "../canvas/geometry/ranks";
 import { asOneEdit } from "../graph/edit";
 import { straighten } from "../graph/edit/waypoints";
 import type { EditAction } from "./edit-action";

@@ -2,7 +2,8 @@
 import { createContext, use } from "react";
 import type * as Y from "yjs";
 import type { EditorStore } from "../canvas/editor-store";
-import { CARD, freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
+import { freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
+import { CARD } from "../canvas/geometry/ranks";
 import type { DryRunSeed } from "../dry-run/seed";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";

@@ -1,8 +1,9 @@
 /** Laying out a graph as one edit: progress is shown when it takes longer, and it can be left. */
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { estimatedSizes, type Positions, type Sizes } from "../canvas/geometry/arrange";
+import { estimatedSizes } from "../canvas/geometry/arrange";
 import { LayoutLeft, layOut } from "../canvas/geometry/layout";
+import type { Positions, Sizes } from "../canvas/geometry/ranks";
 import { asOneEdit, moveActions, setDirection } from "../graph/edit";
 import { changeNote, notesOf } from "../graph/edit/notes";
 import { straighten } from "../graph/edit/waypoints";

@@ -7,7 +7,7 @@ import {
   IconRobot,
   IconRowInsertBottom,
 } from "@tabler/icons-react";
-import { CARD } from "../canvas/geometry/arrange";
+import { CARD } from "../canvas/geometry/ranks";
 import { relationId } from "../graph/document-keys";
 import { writeNote } from "../graph/edit/notes";
 import { EXIT } from "../graph/model";

@@ -3,7 +3,7 @@
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/people";
 import { useEditorStore } from "../canvas/editor-store";
-import { CARD } from "../canvas/geometry/arrange";
+import { CARD } from "../canvas/geometry/ranks";
 import { useDryRun } from "../dry-run/use-dry-run";
 import {
   type AddRequest,

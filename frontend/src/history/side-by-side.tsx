@@ -7,7 +7,8 @@ import {
 } from "@xyflow/react";
 import { type ComponentType, useLayoutEffect } from "react";
 import type { Arrow, CanvasNode } from "../canvas/elements";
-import { type Positions, positionsOf } from "../canvas/geometry/arrange";
+import { positionsOf } from "../canvas/geometry/arrange";
+import type { Positions } from "../canvas/geometry/ranks";
 import { GraphView } from "../canvas/graph-view";
 import { type ChangeMark, ChangeMarked, type ChangeMarks } from "../canvas/marks/change-marks";
 import { notePlaces } from "../canvas/notes/note-nodes";

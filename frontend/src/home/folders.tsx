@@ -1,109 +1,34 @@
 /** Folders of graphs: the way to the one on screen, and those inside of it. */
-import { Button, Menu } from "@mantine/core";
-import {
-  IconChevronRight,
-  IconDots,
-  IconFolder,
-  IconFolderMinus,
-  IconFolderPlus,
-  IconFolderSymlink,
-  IconLock,
-  IconPencil,
-} from "@tabler/icons-react";
-import { Fragment, useState } from "react";
-import { Link, useLocation } from "wouter";
-import { type Folder, foldersWithin, moveFolder } from "../api/folders";
+import { Button } from "@mantine/core";
+import { IconChevronRight, IconDots, IconFolder, IconFolderPlus } from "@tabler/icons-react";
+import { type ComponentProps, Fragment, useState } from "react";
+import { Link } from "wouter";
+import { type Folder, placeOfFolder } from "../api/folders";
 import { useMay } from "../api/people";
+import { LateOpening } from "../ui/late-opening";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
+import type { FolderMenu } from "./folder-menu";
 import style from "./folders.module.css";
 import { RestrictedMark } from "./graph-counts";
 
 const FolderNameDialog = lazyPart(() =>
   import("./folder-dialogs").then((part) => part.FolderNameDialog),
 );
-const MoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.MoveDialog));
-const RuleDialog = lazyPart(() => import("./rule-dialog").then((part) => part.RuleDialog));
-const RemoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.RemoveDialog));
+const Menu = lazyPart(() => import("./folder-menu").then((part) => part.FolderMenu));
 
-const placeOf = (id: string | null | undefined) => (id ? `/?folder=${id}` : "/");
-
-interface MenuProps {
-  folder: Folder;
-  folders: readonly Folder[];
-  /** The folder is the one on screen: who removes it goes to the one around it. */
-  here?: boolean;
-}
-
-function FolderMenu({ folder, folders, here = false }: MenuProps) {
-  const [, go] = useLocation();
-  const [asked, setAsked] = useState<"rename" | "move" | "rule" | "remove" | null>(null);
-  const [opened, setOpened] = useState(false);
-  const mayShare = useMay("share");
-  const ask = (dialog: typeof asked) => {
-    setAsked(dialog);
-    setOpened(true);
-  };
-  const dialog = { opened, onClose: () => setOpened(false) };
+function FolderButton(props: Omit<ComponentProps<typeof FolderMenu>, "button">) {
   return (
-    <>
-      <Menu>
-        <Menu.Target>
-          <button
-            type="button"
-            className={style.more}
-            aria-label={`More about the folder ${isolated(folder.name)}`}
-          >
-            <IconDots size={16} aria-hidden />
-          </button>
-        </Menu.Target>
-        <Menu.Dropdown>
-          <Menu.Item leftSection={<IconPencil size={15} />} onClick={() => ask("rename")}>
-            Rename …
-          </Menu.Item>
-          <Menu.Item leftSection={<IconFolderSymlink size={15} />} onClick={() => ask("move")}>
-            Move to folder …
-          </Menu.Item>
-          {mayShare && (
-            <Menu.Item leftSection={<IconLock size={15} />} onClick={() => ask("rule")}>
-              Who may see its graphs …
-            </Menu.Item>
-          )}
-          <Menu.Item leftSection={<IconFolderMinus size={15} />} onClick={() => ask("remove")}>
-            Remove the folder …
-          </Menu.Item>
-        </Menu.Dropdown>
-      </Menu>
-      <OverlayBoundary>
-        {asked === "rename" && <FolderNameDialog folder={folder} {...dialog} />}
-        {asked === "move" && (
-          <MoveDialog
-            name={folder.name}
-            from={folder.parent ?? null}
-            not={foldersWithin(folders, folder.id)}
-            move={(into) => moveFolder(folder.id, into)}
-            {...dialog}
-          />
-        )}
-        {asked === "rule" && (
-          <RuleDialog
-            ruled={{ kind: "folder", id: folder.id }}
-            name={folder.name}
-            isInside={folder.parent !== undefined}
-            {...dialog}
-          />
-        )}
-        {asked === "remove" && (
-          <RemoveDialog
-            folder={folder}
-            folders={folders}
-            onRemoved={() => here && go(placeOf(folder.parent))}
-            {...dialog}
-          />
-        )}
-      </OverlayBoundary>
-    </>
+    <LateOpening opens="menu" part={(button) => <Menu {...props} button={button} />}>
+      <button
+        type="button"
+        className={style.more}
+        aria-label={`More about the folder ${isolated(props.folder.name)}`}
+      >
+        <IconDots size={16} aria-hidden />
+      </button>
+    </LateOpening>
   );
 }
 
@@ -125,7 +50,7 @@ export function FolderHead({
         {way.slice(0, -1).map(({ id, name }) => (
           <Fragment key={id}>
             <IconChevronRight size={13} aria-hidden />
-            <Link to={placeOf(id)}>{name}</Link>
+            <Link to={placeOfFolder(id)}>{name}</Link>
           </Fragment>
         ))}
       </nav>
@@ -136,7 +61,7 @@ export function FolderHead({
           {folder.name}
         </h2>
         {folder.restricted && <RestrictedMark />}
-        {mayEdit && <FolderMenu folder={folder} folders={folders} here />}
+        {mayEdit && <FolderButton folder={folder} folders={folders} here />}
       </div>
     </div>
   );
@@ -164,7 +89,7 @@ export function FolderCards({
             const below = inside(each.id).length;
             return (
               <li key={each.id} className={style.card}>
-                <Link to={placeOf(each.id)} className={style.open}>
+                <Link to={placeOfFolder(each.id)} className={style.open}>
                   <IconFolder size={20} aria-hidden className="flex-none" />
                   <span className="fill">
                     <span className="row gap-25">
@@ -177,7 +102,7 @@ export function FolderCards({
                     </span>
                   </span>
                 </Link>
-                {mayEdit && <FolderMenu folder={each} folders={folders} />}
+                {mayEdit && <FolderButton folder={each} folders={folders} />}
               </li>
             );
           })}

@@ -1,29 +1,23 @@
 /** A graph as a card: how it is, and who is in it. */
+import { IconDots } from "@tabler/icons-react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
 import { useKnownColors } from "../api/people";
 import type { Run } from "../api/runs";
 import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
-import { boundedPart } from "../ui/lazy-part";
+import { LateOpening } from "../ui/late-opening";
+import { lazyPart } from "../ui/lazy-part";
 import { colorOfName, initials, nameColors } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./graph-card.module.css";
 import { GraphCounts } from "./graph-counts";
+import { GraphPreview } from "./graph-preview";
 import home from "./home.module.css";
 
-/** Decoration, and the reading and laying out of graphs with it: the list is there without. */
-const GraphPreview = boundedPart(
-  () => import("./graph-preview").then((part) => part.GraphPreview),
-  { frame: () => null },
-);
-
-/** Its button stands over the card, so nothing moves when it comes. */
-const GraphMenu = boundedPart(() => import("./graph-menu").then((part) => part.GraphMenu), {
-  waiting: null,
-});
+const GraphMenu = lazyPart(() => import("./graph-menu").then((part) => part.GraphMenu));
 
 const FEW = 4; // robots or labels on a card
 
@@ -109,7 +103,15 @@ export function GraphCard({ graph, last, place }: GraphCardProps) {
           </div>
         </div>
       </Link>
-      <GraphMenu graph={graph} />
+      <LateOpening opens="menu" part={(button) => <GraphMenu graph={graph} button={button} />}>
+        <button
+          type="button"
+          className={home.more}
+          aria-label={`More about ${isolated(graph.name)}`}
+        >
+          <IconDots size={16} aria-hidden />
+        </button>
+      </LateOpening>
     </article>
   );
 }

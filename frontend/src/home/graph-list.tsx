@@ -2,7 +2,7 @@
 import { NativeSelect, Skeleton, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconAlertTriangle, IconSearch } from "@tabler/icons-react";
-import { type ReactNode, useMemo, useState } from "react";
+import { type ReactNode, useEffect, useMemo, useState } from "react";
 import { type Folder, folderPath } from "../api/folders";
 import { useGraphLabels, useGraphPages } from "../api/graph-list";
 import { errorText } from "../api/http";
@@ -106,13 +106,20 @@ export function GraphList({ folders, folder, none, kept, children }: Props) {
   const [picked, setLabel] = useState<string | null>(null);
   const [order, setOrder] = useKept<GraphOrder>("aa.graphs-by", "changed");
   const runs = useMemo(() => lastRuns([...(listed ?? []), ...live.runs.values()]), [listed, live]);
-  const labels = useGraphLabels(folder ?? "").data ?? [];
+  const [hasLabels, setHasLabels] = useState(false);
+  const labels = useGraphLabels(folder ?? "", hasLabels).data ?? [];
   const label = picked !== null && labels.includes(picked) ? picked : null;
   const wanted = graphsWanted({ search, label, order }, folder, runs);
   const pages = useGraphPages(wanted);
   const { graphs, total, isOld, error } = pages;
   const { deep } = wanted;
   const isEmpty = graphs?.length === 0 && !isOld;
+  const isLoading = graphs === undefined && error === null;
+  const isAlone = isEmpty && !deep && folders.length === 0;
+  // In folders, and on pages that are not on screen, there may be some, too.
+  const mayHaveLabels =
+    folders.length > 0 || pages.hasMore || graphs?.some((each) => each.labels?.length);
+  useEffect(() => setHasLabels((was) => was || Boolean(mayHaveLabels)), [mayHaveLabels]);
   return (
     <>
       {error !== null && (
@@ -128,9 +135,8 @@ export function GraphList({ folders, folder, none, kept, children }: Props) {
           {kept}
         </>
       )}
-      {graphs === undefined && error === null && <Skeletons />}
-      {isEmpty && !deep && folders.length === 0 && none}
-      {graphs !== undefined && !(isEmpty && !deep && folders.length === 0) && (
+      {isAlone && none}
+      {(isLoading || graphs !== undefined) && !isAlone && (
         <>
           <Tools
             search={typed}
@@ -157,8 +163,9 @@ export function GraphList({ folders, folder, none, kept, children }: Props) {
               Names, descriptions, robots, labels and the people in them are searched.
             </Empty>
           )}
+          {isLoading && <Skeletons />}
           <div className={home.cards} aria-busy={isOld}>
-            {graphs.map((graph) => (
+            {graphs?.map((graph) => (
               <GraphCard
                 key={graph.id}
                 graph={graph}

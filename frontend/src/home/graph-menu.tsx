@@ -3,7 +3,6 @@ import { Button, Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
   IconCopy,
-  IconDots,
   IconFolderSymlink,
   IconLock,
   IconPencil,
@@ -11,7 +10,7 @@ import {
   IconTrash,
 } from "@tabler/icons-react";
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
-import { type ComponentProps, useState } from "react";
+import { type ComponentProps, type ReactElement, useState } from "react";
 import { fileGraph } from "../api/folders";
 import { fetchGraphNames } from "../api/graph-list";
 import {
@@ -26,9 +25,9 @@ import { errorText } from "../api/http";
 import { fetchLibrary, usedIn } from "../api/library";
 import { serverPath } from "../api/page-url";
 import { useMay } from "../api/people";
+import { useOpening } from "../ui/late-opening";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
-import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */
 export function copyName(name: string, taken: readonly string[]): string {
@@ -86,7 +85,9 @@ const RenamedUses = lazyPart(() =>
 
 type Renamed = Pick<ComponentProps<typeof RenamedUses>, "before" | "name" | "uses">;
 
-export function GraphMenu({ graph }: { graph: GraphSummary }) {
+/** The menu, around its button. */
+export function GraphMenu({ graph, button }: { graph: GraphSummary; button: ReactElement }) {
+  const [opened, setOpened] = useOpening();
   const client = useQueryClient();
   const mayEdit = useMay("edit");
   const mayShare = useMay("share");
@@ -119,16 +120,8 @@ export function GraphMenu({ graph }: { graph: GraphSummary }) {
   };
   return (
     <>
-      <Menu>
-        <Menu.Target>
-          <button
-            type="button"
-            className={style.more}
-            aria-label={`More about ${isolated(graph.name)}`}
-          >
-            <IconDots size={16} aria-hidden />
-          </button>
-        </Menu.Target>
+      <Menu opened={opened} onChange={setOpened}>
+        <Menu.Target>{button}</Menu.Target>
         <Menu.Dropdown>
           {!mayEdit && <Menu.Label>View only</Menu.Label>}
           <Menu.Item

@@ -4,7 +4,7 @@ import { fileURLToPath } from "node:url";
 import { expect, test } from "vitest";
 import type { Thumbnail } from "../api/thumbnails";
 import { fromUmrf } from "../canvas/from-umrf";
-import { arrangedByRank } from "../canvas/geometry/arrange";
+import { arrangedByRank } from "../canvas/geometry/ranks";
 import { outcomeColor } from "../canvas/outcome";
 import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../graph/model";
 import { miniatureOf } from "./graph-preview";

@@ -1,7 +1,7 @@
 /** A graph in miniature: cards as blocks, arrows as lines in the colours of their outcomes. */
 import { useEffect, useMemo, useRef, useState } from "react";
 import { type Thumbnail, useThumbnail } from "../api/thumbnails";
-import { arrangedByRank } from "../canvas/geometry/arrange";
+import { arrangedByRank } from "../canvas/geometry/ranks";
 import { OUTCOMES, outcomeColor } from "../canvas/outcome";
 import { ENTRY, EXIT } from "../graph/model";
 import { colorOfName } from "../ui/name-colors";

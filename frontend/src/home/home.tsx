@@ -6,21 +6,10 @@ import { useSearch } from "wouter";
 import { folderWay, useFolders } from "../api/folders";
 import { useMay } from "../api/people";
 import { Empty } from "../ui/empty";
-import { boundedPart } from "../ui/lazy-part";
+import { DeletedGraphs } from "./deleted-graphs";
+import { FolderCards, FolderHead } from "./folders";
 import { GraphList } from "./graph-list";
 import style from "./home.module.css";
-
-const DeletedGraphs = boundedPart(
-  () => import("./deleted-graphs").then((part) => part.DeletedGraphs),
-  { waiting: null },
-);
-
-const FolderHead = boundedPart(() => import("./folders").then((part) => part.FolderHead), {
-  waiting: null,
-});
-const FolderCards = boundedPart(() => import("./folders").then((part) => part.FolderCards), {
-  waiting: null,
-});
 
 interface Props {
   onNew: () => void;

@@ -1,7 +1,8 @@
 /** Moves everything apart as far as expanded cards need, and maps places between the canvas and the document. Pure. */
 import type { PlaceMap, Spread, StandingGraph } from "../canvas/editor-store";
 import type { Folding } from "../canvas/elements";
-import { cardSize, type Positions, type Sizes } from "../canvas/geometry/arrange";
+import { cardSize } from "../canvas/geometry/arrange";
+import type { Positions, Sizes } from "../canvas/geometry/ranks";
 import { notesOf } from "../graph/edit/notes";
 import type { Graph, JsonText, Key, Position, Relation } from "../graph/model";
 import { readWaypoints } from "../graph/waypoints";

@@ -2,7 +2,7 @@
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
 import { checkedColor } from "../api/people";
-import { CARD, type Positions, type Sizes } from "../canvas/geometry/arrange";
+import { CARD, type Positions, type Sizes } from "../canvas/geometry/ranks";
 import { splitKey } from "../graph/document-keys";
 import type { Participant } from "../sync/presence/presence";
 import { useColorsAfterReturn, useFollowing, usePeople } from "../sync/use-room";

@@ -24,6 +24,7 @@ interface Props {
   /** Returns the options for a search; the first one is chosen. */
   find: (search: string) => readonly Option[];
   onPick: (id: string) => void;
+  onSearch?: (search: string) => void;
   none: string;
   take?: string;
   /** Returns the text that was typed before the field was rendered. */
@@ -115,7 +116,8 @@ export function OptionList(props: OptionListProps) {
 }
 
 export function PickList(props: Props) {
-  const { label, placeholder, find, onPick, none, take = "take", initial, onEmptyKey } = props;
+  const { label, placeholder, find, onPick, onSearch, none, take = "take" } = props;
+  const { initial, onEmptyKey } = props;
   const [search, setSearch] = useState(() => initial?.() ?? "");
   const [at, setAt] = useState(0);
   const id = useId();
@@ -145,6 +147,7 @@ export function PickList(props: Props) {
         value={search}
         onChange={(event) => {
           setSearch(event.currentTarget.value);
+          onSearch?.(event.currentTarget.value);
           setAt(0);
         }}
         onKeyDown={onKeyDown}

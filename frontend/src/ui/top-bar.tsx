@@ -1,7 +1,7 @@
 /** The bar on top of every page: where one is, what one may do, and room for STOP at its right end. */
 
 import { Fragment, type ReactNode, useState } from "react";
-import { Link, useRouter } from "wouter";
+import { Link } from "wouter";
 import { isolated } from "../words/isolated";
 import { useDraft } from "./drafts";
 import { keyOf } from "./keys";
@@ -26,9 +26,10 @@ interface Props {
   account: ReactNode;
 }
 
+/** The mark is in index.html, so that it needs no request. */
 export function Logo() {
-  const { base } = useRouter();
-  return <img src={`${base}/mark.svg`} alt="" width={24} height={24} className="block" />;
+  const icon = document.querySelector<HTMLLinkElement>('link[rel="icon"]');
+  return <img src={icon?.href} alt="" width={24} height={24} className="block" />;
 }
 
 /** The focus goes past the bar. */

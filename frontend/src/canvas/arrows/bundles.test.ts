@@ -12,7 +12,7 @@ import {
 } from "../../graph/model";
 import { sceneOf } from "../elements";
 import { fromUmrf } from "../from-umrf";
-import type { Positions } from "../geometry/arrange";
+import type { Positions } from "../geometry/ranks";
 import { NO_PROBLEM_MARKS } from "../marks/problem-marks";
 import { bundlesOf, pillSizeOf, pillWord } from "./bundles";
 

@@ -1,6 +1,6 @@
 /** Computes the places of aligned and distributed cards. Pure. */
 import type { Key, Position } from "../../graph/model";
-import type { Positions } from "./arrange";
+import type { Positions } from "./ranks";
 
 export interface Block {
   readonly key: Key;

@@ -1,7 +1,8 @@
 /** Moves notes and frames along when a graph is laid out again. Pure. */
 import { inFrame, type Note } from "../../graph/edit/notes";
 import type { Direction, Position } from "../../graph/model";
-import { type Box, CARD, freeSpot, type Sizes } from "./arrange";
+import { type Box, freeSpot } from "./arrange";
+import { CARD, type Sizes } from "./ranks";
 
 type Places = ReadonlyMap<string, Position>;
 

@@ -3,11 +3,10 @@ import type { ElkExtendedEdge, ElkNode, ElkPort, LayoutOptions } from "elkjs/lib
 import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
 import { robotOf } from "../../graph/robots";
 import { type Bundle, bundlesOf, handOversIn, pillSizeOf } from "../arrows/bundles";
+import { estimatedSizes, freeSpot } from "./arrange";
 import {
   CARD,
-  estimatedSizes,
   forward,
-  freeSpot,
   orderOf,
   type Positions,
   pillSize,
@@ -15,7 +14,7 @@ import {
   relationsInOrder,
   type Size,
   type Sizes,
-} from "./arrange";
+} from "./ranks";
 
 /** px between rows; between columns there are LAYERS px and a pill. */
 const ROWS = 44;

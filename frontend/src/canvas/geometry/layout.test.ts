@@ -12,8 +12,9 @@ import {
 } from "../../graph/model";
 import { examples } from "../../testing/doses";
 import { anyAction, anyRelation, graphs } from "../../testing/graphs";
-import { arrange, estimatedSizes, positionsOf, ranksOf } from "./arrange";
+import { arrange, estimatedSizes, positionsOf } from "./arrange";
 import { layoutRequest, placesIn } from "./layout-graph";
+import { ranksOf } from "./ranks";
 
 const elk = new ELK();
 

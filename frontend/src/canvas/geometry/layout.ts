@@ -2,14 +2,8 @@
 import type { ElkNode } from "elkjs/lib/elk-api";
 import { useEffect, useMemo, useState } from "react";
 import type { Graph } from "../../graph/model";
-import {
-  arrange,
-  estimatedSizes,
-  isUnplaced,
-  type Positions,
-  positionsOf,
-  type Sizes,
-} from "./arrange";
+import { arrange, estimatedSizes, isUnplaced, positionsOf } from "./arrange";
+import type { Positions, Sizes } from "./ranks";
 
 /** Signals that a layout was cancelled. */
 export class LayoutLeft extends Error {}

@@ -1,7 +1,7 @@
 /** Computes viewports (offset and zoom) in which text stays readable. Pure. */
 import type { Direction, Position } from "../../graph/model";
-import type { Positions, Sizes } from "./arrange";
-import { CARD } from "./arrange";
+import type { Positions, Sizes } from "./ranks";
+import { CARD } from "./ranks";
 
 export interface Bounds {
   readonly x: number;

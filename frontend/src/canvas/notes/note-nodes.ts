@@ -6,7 +6,7 @@ import type { Direction, Graph, Key } from "../../graph/model";
 import { spokenNote } from "../../graph/note-links";
 import type { ProblemCounts } from "../../graph/problems/problem-kinds";
 import type { Tone } from "../../status/progress";
-import type { Positions } from "../geometry/arrange";
+import type { Positions } from "../geometry/ranks";
 
 /** Style tokens of the colours, which fit both themes. */
 export const noteColor: Readonly<Record<NoteColor, string>> = {

@@ -17,7 +17,7 @@ import { LineContext, LineEditingContext } from "../../canvas/arrows/line-store"
 import type { PlaceMap } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { FoldedFrame } from "../../canvas/folding/folded-frame";
-import { CARD } from "../../canvas/geometry/arrange";
+import { CARD } from "../../canvas/geometry/ranks";
 import { edgeTypes, nodeTypes } from "../../canvas/node-types";
 import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";

@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { PartOnCard } from "../../canvas/editor-store";
-import { CARD } from "../../canvas/geometry/arrange";
+import { CARD } from "../../canvas/geometry/ranks";
 import type { Progress } from "../../status/progress";
 import { followedBox, followingViewport, runningInside, runningKeys } from "./follow-run";
 

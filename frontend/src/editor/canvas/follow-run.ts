@@ -3,7 +3,7 @@ import type { ReactFlowInstance, Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
 import { type ExpandedGraphs, useEditorStore } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
-import type { Positions, Sizes } from "../../canvas/geometry/arrange";
+import type { Positions, Sizes } from "../../canvas/geometry/ranks";
 import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
 import { tick } from "../../clock/server-clock";
 import { GRID } from "../../edit-actions/editor-context";

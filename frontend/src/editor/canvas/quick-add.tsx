@@ -5,7 +5,7 @@
 import { Kbd, TextInput } from "@mantine/core";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
-import { CARD } from "../../canvas/geometry/arrange";
+import { CARD } from "../../canvas/geometry/ranks";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import {
   type AddRequest,

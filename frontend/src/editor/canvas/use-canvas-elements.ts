@@ -46,7 +46,8 @@ import {
   foldingOf,
   wholeSizes,
 } from "../../canvas/folding/folding";
-import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
+import { positionsOf, unplaced } from "../../canvas/geometry/arrange";
+import type { Positions } from "../../canvas/geometry/ranks";
 import type { ProblemMarks } from "../../canvas/marks/problem-marks";
 import { notePlaces } from "../../canvas/notes/note-nodes";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";

@@ -1,7 +1,8 @@
 /** Lays out a graph without any places, and writes them as one edit. */
 import { useEffect, useLayoutEffect, useRef, useState } from "react";
-import { arrange, isUnplaced, type Positions } from "../../canvas/geometry/arrange";
+import { arrange, isUnplaced } from "../../canvas/geometry/arrange";
 import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/layout";
+import type { Positions } from "../../canvas/geometry/ranks";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { freshPlaces } from "../../edit-actions/layout";
 import { placeFirst } from "../../graph/edit";

@@ -6,7 +6,7 @@ import type { LineStore } from "../../canvas/arrows/line-store";
 import type { PlaceMap } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode, Folding } from "../../canvas/elements";
 import { hiding } from "../../canvas/folding/folding";
-import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
+import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/ranks";
 import {
   boundsOf,
   type CanvasArea,

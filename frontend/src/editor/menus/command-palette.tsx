@@ -1,9 +1,12 @@
 /** The command palette: all edit actions with their shortcuts, the actions of this graph, and all graphs. */
+
+import { useDebouncedValue } from "@mantine/hooks";
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
-import { type KeyboardEvent, useLayoutEffect, useMemo, useRef } from "react";
+import { type KeyboardEvent, useLayoutEffect, useMemo, useRef, useState } from "react";
 import { createPortal } from "react-dom";
 import { useLocation } from "wouter";
-import { useGraphs } from "../../api/graphs";
+import { useGraphPages } from "../../api/graph-list";
+import type { GraphSummary } from "../../api/graphs";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
 import type { EditorContext } from "../../edit-actions/editor-context";
@@ -14,6 +17,7 @@ import { matching, type Option, PickList } from "../../ui/pick-list";
 import style from "./command-palette.module.css";
 
 const MOST = 60;
+const PAUSE = 150; // ms without a key before the server is asked
 /** Names of recently used edit actions, the latest first. */
 let recent: readonly string[] = [];
 
@@ -50,6 +54,25 @@ function actionOptions({ graph }: EditorContext): Option[] {
   }));
 }
 
+function graphOptions(graphs: readonly GraphSummary[]): Option[] {
+  return graphs.map(({ id, name, description, robots = [], labels = [] }) => ({
+    id: `graph ${id}`,
+    label: name || "Untitled",
+    sub: description,
+    also: ["go to open graph", ...robots, ...labels].join(" "),
+    group: "Graphs",
+    icon: <IconRouteSquare2 size={16} aria-hidden />,
+  }));
+}
+
+/** The graphs that changed last, and those of all others that the server finds by a search. */
+function useFoundGraphs(search: string) {
+  const [asked] = useDebouncedValue(search, PAUSE);
+  const newest = useGraphPages({ search: "" });
+  const found = useGraphPages({ search: newest.hasMore ? asked.trim() : "" });
+  return { newest: newest.graphs, found: found.graphs };
+}
+
 export function CommandPalette({
   context,
   onClose,
@@ -64,26 +87,23 @@ export function CommandPalette({
     dialog?.show();
     return () => dialog?.close(); // returns the focus
   }, []);
-  const graphs = useGraphs().data;
+  const [search, setSearch] = useState("");
+  const { newest, found } = useFoundGraphs(search);
   // Computed once: the order must not change while the person chooses.
   const first = useRef(context);
   const options = useMemo<Option[]>(
     () => [
       ...commandOptions(first.current),
       ...actionOptions(first.current),
-      ...(graphs ?? [])
-        .filter(({ id }) => id !== first.current.id)
-        .map(({ id, name, description }) => ({
-          id: `graph ${id}`,
-          label: name || "Untitled",
-          sub: description,
-          also: "go to open graph",
-          group: "Graphs",
-          icon: <IconRouteSquare2 size={16} aria-hidden />,
-        })),
+      ...graphOptions((newest ?? []).filter(({ id }) => id !== first.current.id)),
     ],
-    [graphs],
+    [newest],
   );
+  // They come last, so that what has been chosen stays where it is when they arrive.
+  const later = useMemo(() => {
+    const known = new Set(newest?.map(({ id }) => id)).add(first.current.id);
+    return graphOptions((found ?? []).filter(({ id }) => !known.has(id)));
+  }, [newest, found]);
   const onPick = (id: string) => {
     const [kind = "", key = ""] = id.split(" ");
     palette.current?.close(); // an open dialog would keep the focus
@@ -121,7 +141,11 @@ export function CommandPalette({
         <PickList
           label="Find a command, an action or a graph"
           placeholder="What do you want to do, or where to go?"
-          find={(search) => matching(options, search).slice(0, MOST)}
+          find={(words) => [
+            ...matching(options, words).slice(0, MOST),
+            ...matching(later, words).slice(0, MOST),
+          ]}
+          onSearch={setSearch}
           onPick={onPick}
           none="Nothing has this name."
           take="do it"
