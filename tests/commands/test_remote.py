@@ -237,6 +237,36 @@ def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, 
         assert runner.get(f"/api/runs/{run}").json()["state"] == "stopped"
 
 
+def test_a_stopped_run_is_continued_by_command_and_another_one_begins_in_the_middle(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    led = ("--robots", "=simulator")
+    answer = product.cli("run", graph, *led, "--script", files["endless"], "--no-wait")
+    run = answer.stdout.strip()
+    assert run, answer.stderr
+    assert product.cli("stop", run).returncode == 0
+    quick = ("--script", files["quick"])
+    refused = product.cli("run", graph, "--from", run, *quick)
+    assert refused.returncode == 1
+    assert "A_0 had begun and had no outcome" in refused.stderr
+    done = ("--done", "A_0=true", "--reason", "I saw it.")
+    continued = product.cli("run", graph, "--from", run, *done, *quick)
+    assert continued.returncode == 0, continued.stderr
+    assert "B_0: FINISHED" in continued.stdout
+    assert "A_0: FINISHED" not in continued.stdout
+    part = product.cli("run", graph, *led, "--at", "B_0", *quick)
+    assert part.returncode == 0, part.stderr
+    assert "A_0" not in part.stdout
+    with product.runner() as runner:
+        newest, before = runner.get("/api/runs", params={"graph": graph}).json()[:2]
+        assert newest["from"] == {"at": ["B_0"]}
+        assert (before["from"]["run"], before["state"]) == (run, "finished")
+        whole = runner.get(f"/api/runs/{before['id']}").json()
+        assert whole["earlier"]["choices"] == {"A_0": "true"}
+        assert whole["earlier"]["reason"] == "I saw it."
+
+
 def test_a_run_is_stopped_while_no_editor_answers(product: Product, files: dict[str, str]) -> None:
     graph = imported(product, files["graph"])
     run = product.cli("run", graph, "--script", files["endless"], "--no-wait").stdout.strip()

@@ -107,10 +107,65 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         metavar="[ACTION.]INPUT=VALUE",
         help="the value of an input for which the graph asks; again for each. Lists are JSON",
     )
+    _add_from(run)
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
     run.set_defaults(handler=_run)
+
+
+def _add_from(run: argparse.ArgumentParser) -> None:
+    """Add the options of a run that does not begin at the entry."""
+    begins = run.add_argument_group("where it begins")
+    begins.add_argument(
+        "--from",
+        dest="earlier",
+        metavar="RUN",
+        help="continue this led run where it ended, in its version, with its robots and values; with "
+        "--at, only take outcomes and values of it",
+    )
+    begins.add_argument(
+        "--at", action="append", default=[], metavar="NAME", help="begin here; again for each"
+    )
+    begins.add_argument("--only", action="store_true", help="play nothing but these actions")
+    for option, means in (("again", "begins again"), ("leave", "is left: nothing goes on from it")):
+        begins.add_argument(
+            f"--{option}",
+            action="append",
+            default=[],
+            metavar="NAME",
+            help=f"this action, which was under way, {means}; again for each",
+        )
+    begins.add_argument(
+        "--done",
+        type=_outcome,
+        action="append",
+        default=[],
+        metavar="NAME=OUTCOME",
+        help="this one is taken as done: true, false or error, by your word; again for each",
+    )
+    begins.add_argument("--reason", default="", metavar="TEXT", help="how you know the outcome")
+
+
+def _outcome(text: str) -> tuple[str, str]:
+    """Return the action and the outcome in `Lift_0=true`. Raise ArgumentTypeError for another text."""
+    name, _, outcome = text.rpartition("=")
+    if not name or outcome not in {"true", "false", "error"}:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form NAME=true|false|error")
+    return name, outcome
+
+
+def _start_from(options: argparse.Namespace) -> dict[str, Any] | None:
+    """Return where a run begins, as a start says it; None for the entry."""
+    if options.earlier is None and not options.at:
+        return None
+    choices = dict.fromkeys(options.again, "again") | dict.fromkeys(options.leave, "leave")
+    start: dict[str, Any] = {"at": options.at, "only": options.only}
+    if options.earlier is not None:
+        start["run"] = options.earlier
+    if choices or options.done:
+        start |= {"choices": choices | dict(options.done), "reason": options.reason}
+    return start
 
 
 def _setting(text: str) -> tuple[str, str]:
@@ -270,8 +325,15 @@ def _run(options: argparse.Namespace) -> int:
 
     with running(options) as server:
         graph = server.graph_id(options.graph)
-        label = {"label": options.label} if options.label else {}
-        version = server.editor("POST", f"/api/graphs/{graph}/versions", json=label).json()
+        start = _start_from(options)
+        continued = None
+        if start is not None and not options.at:
+            continued = server.runner("GET", f"/api/runs/{options.earlier}").json()
+        if continued is not None:
+            version = server.editor("GET", f"/api/versions/{continued['version']}").json()
+        else:
+            label = {"label": options.label} if options.label else {}
+            version = server.editor("POST", f"/api/graphs/{graph}/versions", json=label).json()
         order = {
             "version": version["id"],
             "digest": version["digest"],
@@ -285,13 +347,18 @@ def _run(options: argparse.Namespace) -> int:
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
         if options.robots is not None:
             order |= {"engine": "conducted", "robots": options.robots, "lost": options.lost}
+        if start is not None:
+            order["from"] = start
+        if continued is not None:
+            led = {"robots": continued["robots"], "lost": options.lost}
+            order |= {"engine": "conducted", "values": continued.get("values", {}), **led}
         breakpoints = _breakpoints(server, version, options)
         if breakpoints:
             order["breakpoints"] = breakpoints
         if options.watching:
             order["watching"] = dict.fromkeys(options.watching, True)
         if options.values:
-            order["values"] = _values(server, version["umrf"], options.values)
+            order["values"] = _values(server, order, options.values)
         if options.drill:
             order["drill"] = True
         if options.accept is not None:
@@ -323,10 +390,13 @@ def _breakpoints(
     return [*chosen, *of_graph]
 
 
-def _values(server: Server, umrf: Any, settings: Sequence[tuple[str, str]]) -> dict[str, Any]:
+def _values(
+    server: Server, order: dict[str, Any], settings: Sequence[tuple[str, str]]
+) -> dict[str, Any]:
     from action_assistant.umrf.start_values import AskedInput
 
-    asked = server.runner("POST", "/api/asked_inputs", json={"umrf": umrf})
+    wanted = {name: order[name] for name in ("umrf", "graph", "from") if name in order}
+    asked = server.runner("POST", "/api/asked_inputs", json=wanted)
     return values_of(settings, decoded(asked, list[AskedInput]))
 
 

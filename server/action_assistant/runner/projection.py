@@ -153,6 +153,10 @@ def _first_summary(asked: Requested) -> dict[str, object]:
         summary["watching"] = asked.watching
     if asked.values:
         summary |= {"values": asked.values, "sent_digest": asked.sent_digest}
+    if asked.start_from is not None:
+        number = 0 if asked.earlier is None else asked.earlier.number
+        start = msgspec.structs.asdict(asked.start_from)
+        summary |= {"from": start | {"number": number}, "sent_digest": asked.sent_digest}
     return summary
 
 

@@ -246,13 +246,18 @@ export interface RunnerApi {
     };
     /**
      * AskedInputsRequest
-     * @description A graph, of which the inputs are wanted for which a start asks.
+     * @description A graph, of which the inputs are wanted for which a start asks. `from`: where that begins, if not
+     *     at the entry; `graph`: the id of the graph, if it takes values of an earlier run.
      */
     AskedInputsRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
         umrf: {
             [key: string]: unknown;
         } | string;
+        /** @default null */
+        graph?: string | null;
+        /** @default null */
+        from?: RunnerApi["StartFrom"] | null;
     };
     /**
      * AskedOthers
@@ -260,6 +265,17 @@ export interface RunnerApi {
      */
     AskedOthers: {
         receivers: number;
+    };
+    /**
+     * AssumedShown
+     * @description An action that counts as ended. `outcome`: of the earlier run, null if no run shows one, and `at`
+     *     when it came; `by`: the person who stated it, "" if it was seen.
+     */
+    AssumedShown: {
+        action: string;
+        outcome: ("error" | "false" | "stopped" | "true") | null;
+        at: string | null;
+        by: string;
     };
     /**
      * AtRestShown
@@ -680,6 +696,34 @@ export interface RunnerApi {
         most: number | null;
     };
     /**
+     * EarlierShown
+     * @description The outcomes and values that a run takes for granted. `number`: of the earlier run, 0 for none; `begins`: the actions
+     *     with which it begins; `assumed`, `values`: outcomes and values of before; `skipped`: what it does not
+     *     play; `ended_by`: what only a skipped action would stop; `under_way`: the actions that had begun and
+     *     had no outcome, for each of which a person chooses (`choices`, with the reason of their word).
+     */
+    EarlierShown: {
+        number: number;
+        begins: string[];
+        assumed: RunnerApi["AssumedShown"][];
+        values: RunnerApi["TakenValueShown"][];
+        skipped: string[];
+        ended_by: RunnerApi["EndedBy"][];
+        under_way: RunnerApi["UnderWay"][];
+        choices: {
+            [key: string]: "again" | "error" | "false" | "leave" | "true";
+        };
+        reason: string;
+    };
+    /**
+     * EndedBy
+     * @description An action that an arrow of another one would stop, which is left out. Both by full name.
+     */
+    EndedBy: {
+        action: string;
+        by: string;
+    };
+    /**
      * EnginesMessage
      * @description All engines, sent when one of them has changed.
      */
@@ -841,6 +885,8 @@ export interface RunnerApi {
                 [key: string]: boolean | number | string | (boolean | number | string)[];
             };
         };
+        /** @default null */
+        from?: RunnerApi["StartFrom"] | null;
     };
     /**
      * GroupShown
@@ -1093,6 +1139,7 @@ export interface RunnerApi {
             };
         };
         sent_digest?: string;
+        from?: RunnerApi["StartFromShown"];
         cause: string;
         pinned: boolean;
         note: string;
@@ -1376,7 +1423,8 @@ export interface RunnerApi {
      * @description The pre-flight of a graph on one engine. `override`: the codes that a person would have to
      *     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
      *     `tree_digest`: of it together with the graphs inside; `order_digest`: of all that a second person
-     *     says yes to, "" where nobody has to.
+     *     says yes to, "" where nobody has to; `earlier`: what the start takes for granted, on the first engine
+     *     of it, null if it begins at the entry.
      */
     Preflight: {
         engine: string;
@@ -1386,6 +1434,7 @@ export interface RunnerApi {
         override: string[];
         never: boolean;
         order_digest: string;
+        earlier: RunnerApi["EarlierShown"] | null;
     };
     /**
      * Problem
@@ -2020,6 +2069,7 @@ export interface RunnerApi {
             };
         };
         sent_digest?: string;
+        from?: RunnerApi["StartFromShown"];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2037,7 +2087,7 @@ export interface RunnerApi {
      *     held at the start; `watching`: those that they said to watch. `hidden`: the
      *     reader may not see its graph, so that little else is given. `values`: those that were given at the
      *     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
-     *     them, which was sent.
+     *     them, which was sent, or of the part that was. `from`: where it began, if not at the entry.
      */
     RunSummary: {
         id: string;
@@ -2084,12 +2134,14 @@ export interface RunnerApi {
             };
         };
         sent_digest?: string;
+        from?: RunnerApi["StartFromShown"];
     };
     /**
      * RunWhole
      * @description A run with the graph that was sent. `sent`: the values of its actions, by full name and flat
      *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
-     *     `tree_digest`: of the graph together with them, null if the starter did not send it.
+     *     `tree_digest`: of the graph together with them, null if the starter did not send it; `earlier`: what
+     *     it takes for granted, null if it began at the entry.
      */
     RunWhole: {
         id: string;
@@ -2136,6 +2188,7 @@ export interface RunnerApi {
             };
         };
         sent_digest?: string;
+        from?: RunnerApi["StartFromShown"];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2157,6 +2210,7 @@ export interface RunnerApi {
         archived: RunnerApi["ArchivedShown"] | null;
         subgraphs: RunnerApi["SubgraphShown"][];
         tree_digest: string | null;
+        earlier: RunnerApi["EarlierShown"] | null;
     };
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
@@ -2338,6 +2392,44 @@ export interface RunnerApi {
         longest: RunnerApi["DurationBounds"] | null;
     };
     /**
+     * StartFrom
+     * @description The place where a start begins, if not at the entry. `run`: the earlier run whose outcomes and values count,
+     *     "" for none. `at`: the actions with which it begins, by full name; without any it is continued where
+     *     that run ended. `only`: nothing but these actions is played. `choices`: for each action that was
+     *     under way when that run ended, by full name; `reason`: how the person knows the outcomes among
+     *     them.
+     */
+    StartFrom: {
+        /** @default  */
+        run?: string;
+        /** @default [] */
+        at?: string[];
+        /** @default false */
+        only?: boolean;
+        /** @default {} */
+        choices?: {
+            [key: string]: "again" | "error" | "false" | "leave" | "true";
+        };
+        /** @default  */
+        reason?: string;
+    };
+    /**
+     * StartFromShown
+     * @description The place where a run began, if not at the entry. `run`, `number`: the earlier run whose outcomes and values
+     *     count, "" and 0 for none; `at`: the actions with which it began, none if it continued that run where
+     *     it ended; `only`: it played nothing else.
+     */
+    StartFromShown: {
+        /** @default  */
+        run?: string;
+        /** @default 0 */
+        number?: number;
+        /** @default [] */
+        at?: string[];
+        /** @default false */
+        only?: boolean;
+    };
+    /**
      * StartRequest
      * @description A start: the version by value, and the engine that runs it.
      *
@@ -2351,6 +2443,7 @@ export interface RunnerApi {
      *     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
      *     version, as the editor seals them; without it, where there are rules, the run is for its starter
      *     and owners. `values`: those of inputs for which the graph asks; its digest stays that without them.
+     *     `from`: where it begins, if not at the entry.
      */
     StartRequest: {
         version: string;
@@ -2399,6 +2492,8 @@ export interface RunnerApi {
                 [key: string]: boolean | number | string | (boolean | number | string)[];
             };
         };
+        /** @default null */
+        from?: RunnerApi["StartFrom"] | null;
     };
     /**
      * StartShown
@@ -2543,6 +2638,19 @@ export interface RunnerApi {
         problems: string[];
     };
     /**
+     * TakenValueShown
+     * @description A value of an earlier run, with which the input `name` of `action` begins. `source`: the action that
+     *     gave it, and `at` when; `text`: the value as JSON.
+     */
+    TakenValueShown: {
+        action: string;
+        name: string;
+        source: string;
+        text: string;
+        /** Format: date-time */
+        at: string;
+    };
+    /**
      * TokenList
      * @description The tokens of a server. `most_days`: the longest life that a new one may get.
      */
@@ -2587,6 +2695,17 @@ export interface RunnerApi {
     TokenUse: {
         at: number;
         address: string;
+    };
+    /**
+     * UnderWay
+     * @description An action that had begun and had no outcome when the earlier run was stopped. `robot`: that played
+     *     it; `seen`: the outcome that was seen after the Stop, "" for none.
+     */
+    UnderWay: {
+        action: string;
+        robot: string;
+        /** @default  */
+        seen?: ("on_error" | "on_false" | "on_stopped" | "on_true") | "";
     };
     /**
      * UnlockWanted

@@ -41,11 +41,10 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs import views
-from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.runs.sight import HIDDEN_NAME, names_seen, run_graphs
 from action_assistant.runner.start.admission import (
+    AskedInputsRequest,
     GroupRequest,
-    asked_for,
     decoded,
     read_group,
 )
@@ -77,12 +76,6 @@ class ReachStatus(msgspec.Struct, frozen=True):
     engines: list[Robot]
     no_reach: str
     behaviours: BehaviourList | None = None
-
-
-class AskedInputsRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A graph, of which the inputs are wanted for which a start asks."""
-
-    umrf: SentGraph
 
 
 class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -420,7 +413,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def asked(request: _Asking) -> list[AskedInput]:
         async with body_of(request, services.body_limit) as body:
             wanted = decoded(body, AskedInputsRequest)
-            return list(await services.run_in_worker(asked_for, bytes(wanted.umrf)))
+            return list(await services.control.asked_inputs(wanted, identity_of(request)))
 
     @post(
         "/api/groups",

@@ -21,25 +21,18 @@ from action_assistant.runner.execution.conducted_steps import (
 from action_assistant.runner.execution.conductor import Conductor
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
-from action_assistant.runner.execution.piece_values import returned_of
 from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.stored_course import stored_course
 from action_assistant.runner.execution.unread_runs import UNREAD, UnreadRun
-from action_assistant.runner.links.led_calls import CourseStep, LedCourse, Played, Stopped
+from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.port import Leaves, unwatched
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
     Author,
     MovesAgain,
-    PieceBegan,
-    PieceEnded,
-    PieceWaits,
-    PlayBegan,
-    Published,
     Requested,
     Silent,
-    StopRequested,
-    decode,
 )
 from action_assistant.runner.runs.history import LeftRun, RunHistory, piece_number
 from action_assistant.runner.runs.run import Run
@@ -51,7 +44,6 @@ from action_assistant.web.auth.identity import Identity
 
 log: Final = logging.getLogger(__name__)
 
-_PAGE: Final = 500  # events read at once
 _RESTARTED: Final = "The runner was restarted while it led this run."
 _BEFORE: Final = "Before that it was held: "
 _STORED_S: Final = 5  # for which a person waits until the journal has an outcome by word
@@ -261,65 +253,34 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
     """Return how far an earlier process led a led run, from its stored events. `first`: the
     first of them; `now`: the run as all of them show it. Raise Unavailable if the journal cannot be
     read."""
-    ends: list[tuple[int, CourseStep]] = []
-    began = first.at
+    course = await stored_course(history, first)
     unproven: Run | None = None
-    noted: set[str] = set()
-    newest: dict[int, str] = {}  # the last noted piece of each call without an outcome
-    over: set[int] = set()  # the calls with an outcome
-    calls: dict[int, str] = {}
-    played: dict[int, str] = {}
-    after = 0
-    while events := await history.events(first.run, after, _PAGE):
-        after = events[-1].seq
-        for stored in events:
-            match decode(stored.kind, stored.body):
-                case Published(at=at):
-                    began = at
-                case PieceWaits(call=call, node=node):
-                    calls[call] = node
-                case PieceBegan(call=call, piece=piece, node=node):
-                    calls[call] = node
-                    noted.add(piece)
-                    newest[call] = piece
-                case PieceEnded(at=at, call=call, how=how, piece=piece) as ended:
-                    if how == "word":
-                        unproven = (await history.left(piece))[0] or unproven
-                    calls[call] = ended.node
-                    newest.pop(call, None)
-                    over.add(call)
-                    ends.append((at, returned_of(ended)))
-                case PlayBegan(at=at, call=call, node=node):
-                    calls[call] = played[call] = node
-                    over.add(call)
-                    ends.append((at, Played(call, node)))
-                case StopRequested(at=at):
-                    ends.append((at, Stopped()))
+    for piece in course.by_word:
+        unproven = (await history.left(piece))[0] or unproven
     pieces: dict[int, tuple[Run, int]] = {}
     again: list[tuple[Run, int]] = []
     sent = await history.piece_ids(first.run)
     moved = await history.piece_ids(first.run, MovesAgain.kind)
     for id_ in sent:
         # Of the others the outcome is known, or a newer piece was sent for their call.
-        is_open = id_ not in noted or id_ in newest.values()
+        is_open = id_ not in course.noted or id_ in course.newest.values()
         if not is_open and id_ not in moved:
             continue
         left, seq = await _left_piece(history, id_)
-        if left.piece is not None and is_open and left.piece.call not in over:
+        if left.piece is not None and is_open and left.piece.call not in course.over:
             pieces[left.piece.call] = left, seq
         elif id_ in moved and left.end is None:
             again.append((left, seq))
-    steps = tuple(((at - began) / 1000, step) for at, step in ends)
     return LeftOpen(
         order=order_of(first),
-        course=LedCourse(began=began, steps=steps),
+        course=LedCourse(began=course.began, steps=course.steps),
         sent=max(map(piece_number, sent), default=0),
         pieces=pieces,
         again=tuple(again),
         states={name: each.state for name, each in now.actions.items()},
         unproven=unproven,
-        calls=calls,
-        played=played,
+        calls=course.calls,
+        played=course.played,
         breakpoints=now.breakpoints,
     )
 

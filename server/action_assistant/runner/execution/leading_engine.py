@@ -18,6 +18,7 @@ from action_assistant.errors import Conflict
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.conducted_steps import LeftOpen, order_of
 from action_assistant.runner.links.led_calls import CourseStep, LedCourse, Played, Stopped
+from action_assistant.runner.links.observations import GraphState
 from action_assistant.runner.links.port import (
     Answer,
     CallBegan,
@@ -29,6 +30,7 @@ from action_assistant.runner.links.port import (
     Order,
     Report,
     Standing,
+    Transitions,
 )
 from action_assistant.runner.links.simulator import LeadableLink
 from action_assistant.runner.runs.events import Requested
@@ -70,11 +72,13 @@ class LeadingEngine:
         #: None can be had any more: only Stop is left.
         self.is_past_help = False
         self._began = left.course.began if left is not None else first.at
+        past = () if first.before is None else first.before.ends
         self._course: list[tuple[float, CourseStep]] = (
-            list(left.course.steps) if left is not None else []
+            list(left.course.steps) if left is not None else [(e.ms, e.returned) for e in past]
         )
         #: The full names of the actions of the calls that were reported, by number.
-        self._calls = dict(left.calls) if left is not None else dict[int, str]()
+        before = first.before.calls if first.before is not None else {}
+        self._calls = dict(left.calls if left is not None else before)
         #: The calls that have an outcome, or that the engine plays: another engine asks for none.
         self._over = {step.number for _, step in self._course if not isinstance(step, Stopped)}
 
@@ -99,10 +103,22 @@ class LeadingEngine:
             raise Conflict("What leads this run is being begun again. Try that in some seconds.")
 
     async def start(self, order: Order, leaves: Leaves) -> None:
-        """Start the whole graph. `leaves` is called right before that. Raise EngineRefused if the
-        engine refuses it, NotSent or NoAnswer if it cannot be started."""
-        self._began = self._clock_us()
-        await self._engine.start(order, leaves)
+        """Start the whole graph, or continue it where the earlier run ended. `leaves` is called right
+        before that. Raise EngineRefused if the engine refuses it, NotSent or NoAnswer if it cannot be
+        started."""
+        before = self._first.before
+        if before is None:
+            self._began = self._clock_us()
+            await self._engine.start(order, leaves)
+            return
+        leaves()
+        now = self._clock_us()
+        self._began = now - round(before.took_ms * 1000)
+        await self._engine.take_up(
+            order, LedCourse(began=self._began, steps=tuple(self._course), calls=dict(self._calls))
+        )
+        running = GraphState(now, self._first.graph_name, "RUNNING")
+        self._hear(Transitions(run=self._first.run, changes=(running,)))
 
     async def stop(self, graph_name: str) -> None:
         """Stop the whole graph, in this engine and in each that takes its place."""

@@ -79,6 +79,8 @@ class LedGate(Gate):
         #: Where the run waits, as its start or a person has set it.
         self.breakpoints = first.breakpoints
         self._calls: dict[str, set[int]] = {}  # that have begun so far, by full name of the action
+        for number, node in first.before.calls.items() if first.before is not None else ():
+            self._calls.setdefault(node, set()).add(number)
         self._reached: set[tuple[str, int]] = set()  # breakpoints before calls that were reached
         self._due: list[str] = []  # breakpoints that were reached during trouble
 

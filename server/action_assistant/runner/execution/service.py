@@ -17,6 +17,7 @@ from action_assistant.errors import Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.conductors import Conductors
+from action_assistant.runner.execution.earlier_runs import EarlierRuns
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.led_commands import (
     LedCommands,
@@ -52,6 +53,7 @@ from action_assistant.runner.runs.sight import RunGraphs, Unseen, run_graphs
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import (
+    AskedInputsRequest,
     GroupRequest,
     ResumeRequest,
     StartRequest,
@@ -65,6 +67,7 @@ from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.rights_registry import IdentityNow, RightsRegistry, unchanged
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.umrf.files.codec import Unreadable
+from action_assistant.umrf.start_values import AskedInput
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.workers.lanes import RunInWorker
@@ -116,6 +119,7 @@ class ExecutionService:
             self.rights,
             sources.sight,
         )
+        self._earlier = EarlierRuns(self._runs, self.history, self.sight, runtime.run_in_worker)
         self._checks = StartChecks(
             self._runs,
             self._late_activity,
@@ -127,6 +131,7 @@ class ExecutionService:
             rights=self.rights,
             simulator=simulator,
             sources=sources,
+            earlier=self._earlier,
         )
         self._conductors = Conductors(robots, look, self._runs, self.history, simulator, runtime)
         self._led = LedCommands(
@@ -234,6 +239,13 @@ class ExecutionService:
         by = identity or operator_of(Author(starter, ""))
         await self._checks.require_sight(group, by)
         return await self._checks.look(group, by)
+
+    async def asked_inputs(
+        self, wanted: AskedInputsRequest, identity: Identity
+    ) -> tuple[AskedInput, ...]:
+        """Return the inputs for which a start of a graph asks. Raise a subclass of Refused if it cannot
+        begin where it says."""
+        return await self._earlier.asked_inputs(wanted, identity)
 
     def under_way(self, request_id: str) -> bool:
         """Return whether the start, or the start of a group, with this request id is being carried

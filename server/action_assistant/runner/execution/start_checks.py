@@ -16,6 +16,7 @@ from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
 from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS, leading_facts
+from action_assistant.runner.execution.earlier_runs import EarlierRuns
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
@@ -42,13 +43,20 @@ from action_assistant.runner.start.admission import (
     watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
-from action_assistant.runner.start.led_items import INDEXING, led_item, led_items
+from action_assistant.runner.start.led_items import (
+    INDEXING,
+    beginning_items,
+    led_item,
+    led_items,
+    with_beginning,
+)
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.start.rights_registry import (
     ReleaseOf,
     RightsRegistry,
     nothing_released,
 )
+from action_assistant.runner.start.start_from import EarlierRun
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.check import forbids_start
@@ -145,8 +153,10 @@ class StartChecks:
         rights: RightsRegistry,
         simulator: Simulator,
         sources: StartSources,
+        earlier: EarlierRuns,
     ) -> None:
         self._runs = runs
+        self._earlier = earlier
         self._late_activity = late_activity
         self._robots = robots
         self._foreign_stops = foreign_stops
@@ -190,14 +200,16 @@ class StartChecks:
                     "A Stop drill is made with a graph that is handed over whole.", where=where
                 )
             return await self._accept_conducted(request, starter)
+        earlier = await self._earlier.read(request, starter)
         if request.robots:
             raise BadInput("Only a led run has several robots.", where={"path": "/robots"})
         watched_in(request.watching, engines_of(request))
         if request.engine == SIMULATOR:
-            return await self._accept_simulation(request)
+            return await self._accept_simulation(request, earlier)
         robot = self._robots.reachable(request.engine)
         _require_plain(request)
-        ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
+        prepare = partial(prepared, earlier=earlier)
+        ready = await self._run_in_worker(prepare, request, robot.facts, random_id())
         order = order_of(request, ready.tree_digest, overridden_in(request))
         return await self._accept_on(robot, request, ready, starter, order=order)
 
@@ -245,8 +257,10 @@ class StartChecks:
         check refuses it."""
         _require_plain(request)
         watched_in(request.watching, engines_of(request))
-        ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
-        items = led_items(ready)
+        prepare = partial(prepared_pieces, earlier=await self._earlier.read(request, starter))
+        ready = await self._run_in_worker(prepare, request, CONDUCTED_FACTS, random_id())
+        request = msgspec.structs.replace(request, robots=ready.robots)
+        items = (*beginning_items(ready.whole, request.start_from), *led_items(ready))
         overridden = overridden_in(request)
         order = order_of(request, ready.whole.tree_digest, overridden)
         preflight.require_clear(items, overridden)
@@ -286,9 +300,12 @@ class StartChecks:
             ),
         )
 
-    async def _accept_simulation(self, request: StartRequest) -> AcceptedStart:
+    async def _accept_simulation(
+        self, request: StartRequest, earlier: EarlierRun | None
+    ) -> AcceptedStart:
         facts = self._simulated_facts(request)
-        ready = await self._run_in_worker(prepared, request, facts, random_id())
+        prepare = partial(prepared, earlier=earlier)
+        ready = await self._run_in_worker(prepare, request, facts, random_id())
         behaviours = await self._behaviours_for(ready) if request.behaviours else None
         link = self._simulator(facts, ready.script, self._clock_us, behaviours)
         return AcceptedStart(
@@ -473,16 +490,19 @@ class StartChecks:
         """Return the pre-flight of a led run: first that of the whole graph, then that of
         each robot. `starter`: the person who would start."""
         try:
-            ready = await self._run_in_worker(
-                partial(prepared_pieces, approved=False), request, CONDUCTED_FACTS, ""
-            )
+            earlier = await self._earlier.read(request, starter)
+            prepare = partial(prepared_pieces, approved=False, earlier=earlier)
+            ready = await self._run_in_worker(prepare, request, CONDUCTED_FACTS, "")
         except Refused as refused:
             item = preflight.refusal_item(_code_of(refused), refused)
             return [preflight.with_verdict(CONDUCTED, [item])]
-        whole = ready.whole
+        whole, start = ready.whole, request.start_from
+        request = msgspec.structs.replace(request, robots=ready.robots)
         marks = preflight.breakpoint_items(request.breakpoints, is_led=True)
-        items = [preflight.graph_item(whole), *led_items(ready), *marks]
-        found = [preflight.with_verdict(CONDUCTED, items, whole.digest, whole.tree_digest)]
+        begins = beginning_items(whole, start)
+        items = [preflight.graph_item(whole), *begins, *led_items(ready), *marks]
+        first = preflight.with_verdict(CONDUCTED, items, whole.digest, whole.tree_digest)
+        found = [with_beginning(first, whole, start)]
         for name in engines_of(request):
             try:
                 robot = self._robots.reachable(name)
@@ -514,8 +534,11 @@ class StartChecks:
         except Refused as refused:
             return preflight.with_verdict(request.engine, [preflight.refusal_item("link", refused)])
         try:
-            ready = await self._run_in_worker(partial(prepared, approved=False), request, facts, "")
+            earlier = await self._earlier.read(request, starter)
+            prepare = partial(prepared, approved=False, earlier=earlier)
+            ready = await self._run_in_worker(prepare, request, facts, "")
             items.append(preflight.graph_item(ready))
+            items += beginning_items(ready, request.start_from)
             items += preflight.breakpoint_items(request.breakpoints, is_led=False)
             if request.behaviours:
                 await self._behaviours_for(ready)
@@ -525,8 +548,10 @@ class StartChecks:
             items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
             items += self._rights.items(request.engine, starter, claim_of(request, ready))
             items += await self._engine_items(robot, ready, starter)
-        digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
-        return preflight.with_verdict(request.engine, items, *digests)
+        if ready is None:
+            return preflight.with_verdict(request.engine, items)
+        found = preflight.with_verdict(request.engine, items, ready.digest, ready.tree_digest)
+        return with_beginning(found, ready, request.start_from)
 
     async def _engine_items(
         self,

@@ -216,7 +216,7 @@ def _to_store(
 ) -> tuple[Requested, Order]:
     """Return the event that stores a start, and the order that is handed to the link. `at`: µs UTC;
     `number`: of the new run; `group`: the id of its group, or None."""
-    request, ready = accepted.request, accepted.prepared
+    request, ready, begins = accepted.request, accepted.prepared, accepted.prepared.beginning
     requested = Requested(
         at=at,
         run=ready.run,
@@ -245,8 +245,13 @@ def _to_store(
         breakpoints=accepted.breakpoints,
         drill=request.drill,
         values=request.values,
-        sent_digest=ready.sent_digest if request.values else "",
+        sent_digest=ready.sent_digest
+        if request.values or ready.sent_digest != ready.digest
+        else "",
         beyond=ready.beyond,
+        start_from=request.start_from,
+        earlier=None if begins is None else begins.earlier,
+        before=None if begins is None else begins.before,
     )
     targets = () if accepted.is_simulated or accepted.led else (request.engine,)
     graph = GraphOutline(ready.name, ready.actions)

@@ -13,6 +13,7 @@ import msgspec
 from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Seen
+from action_assistant.runner.runs.earlier import Before, Earlier, StartFrom
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.laps import Laps
@@ -127,7 +128,10 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     unsighted: bool = False  # there were rules, and it did not: only its author and owners see it
     values: StartValues = {}  # given at the start; `umrf` has them, the version does not
     sent_digest: str = ""  # of `umrf` with them; "" if there are none
-    beyond: bool = False  # some are of inputs that the version does not leave open
+    beyond: bool = False  # they, or the part that is played, are not what the version says
+    start_from: StartFrom | None = None  # where it begins, if not at the entry
+    earlier: Earlier | None = None  # all that it takes for granted then
+    before: Before | None = None  # the course of the run that it continues
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -593,7 +597,7 @@ def decode(kind: str, body: bytes) -> RunEvent:
 
 #: Fields of events that are for programs, or too large to be read; people may search all other texts.
 _NOT_SEARCHED: Final = frozenset({
-    "actions", "address", "aid", "at", "by", "digest", "piece", "graph", "group", "hash", "id", "incarnation", "inner_laps",
+    "actions", "address", "aid", "at", "before", "by", "earlier", "digest", "piece", "graph", "group", "hash", "id", "incarnation", "inner_laps",
     "laps", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
     "version",
 })  # fmt: skip

@@ -69,6 +69,15 @@ def by_request(request_id: str) -> Select[Any]:
     return select(*fields).where(run.c.request_id == request_id)
 
 
+def continued_by(earlier: str) -> Select[Any]:
+    """Return the query for the numbers of the runs that continued a run where it ended. One that was
+    refused did not."""
+    origin = func.json_extract(run.c.summary, "$.from.run")
+    at = func.json_extract(run.c.summary, "$.from.at")
+    chosen = and_(origin == earlier, at == "[]", run.c.state != "refused")
+    return select(run.c.number).where(chosen).order_by(run.c.number)
+
+
 def of_start(request_id: str) -> Select[Any]:
     """Return the query for the ids of the runs that a start has created. In a start on several
     robots the request id of each run begins with the id of the group."""

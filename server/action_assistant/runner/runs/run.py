@@ -6,6 +6,7 @@ import msgspec
 
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import ACTIVE, TERMINAL
+from action_assistant.runner.runs.earlier import Earlier, StartFrom
 from action_assistant.runner.runs.events import (
     AtRest,
     Author,
@@ -150,7 +151,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     unsighted: bool = False  # as in its request
     values: StartValues = {}  # given at the start
     sent_digest: str = ""  # of the graph with them; "" if there are none
-    beyond: bool = False  # some are of inputs that the version does not leave open
+    beyond: bool = False  # they, or the part that is played, are not what the version says
+    start_from: StartFrom | None = None  # where it begins, if not at the entry
+    earlier: Earlier | None = None  # all that it takes for granted then
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

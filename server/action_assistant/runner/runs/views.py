@@ -11,6 +11,12 @@ from sqlalchemy import Row
 from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import DurationBounds, of_run
+from action_assistant.runner.runs.earlier_views import (
+    EarlierShown,
+    StartFromShown,
+    earlier_view,
+    start_from_view,
+)
 from action_assistant.runner.runs.events import (
     AtRest,
     Author,
@@ -68,6 +74,8 @@ _BLANK: Final[dict[str, Any]] = {
     "batons": msgspec.UNSET,
     "values": msgspec.UNSET,
     "sent_digest": msgspec.UNSET,
+    "start_from": msgspec.UNSET,
+    "earlier": None,
     "cause": "",
     "pinned": False,
     "note": "",
@@ -217,7 +225,7 @@ class RobotRestShown(msgspec.Struct, frozen=True, omit_defaults=True):
         hold_names(self, "why")
 
 
-class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
+class RunSummary(msgspec.Struct, frozen=True, kw_only=True, rename={"start_from": "from"}):
     """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
@@ -225,7 +233,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     held at the start; `watching`: those that they said to watch. `hidden`: the
     reader may not see its graph, so that little else is given. `values`: those that were given at the
     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
-    them, which was sent."""
+    them, which was sent, or of the part that was. `from`: where it began, if not at the entry."""
 
     id: str
     number: int
@@ -262,6 +270,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     hidden: bool | msgspec.UnsetType = msgspec.UNSET
     values: StartValues | msgspec.UnsetType = msgspec.UNSET
     sent_digest: str | msgspec.UnsetType = msgspec.UNSET
+    start_from: StartFromShown | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -313,7 +322,8 @@ class RunShown(RunSummary, frozen=True, kw_only=True):
 class RunWhole(RunShown, frozen=True, kw_only=True):
     """A run with the graph that was sent. `sent`: the values of its actions, by full name and flat
     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
-    `tree_digest`: of the graph together with them, null if the starter did not send it."""
+    `tree_digest`: of the graph together with them, null if the starter did not send it; `earlier`: what
+    it takes for granted, null if it began at the entry."""
 
     umrf: UmrfGraph
     override: Override | None
@@ -322,6 +332,7 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     archived: ArchivedShown | None
     subgraphs: list[SubgraphShown]
     tree_digest: str | None
+    earlier: EarlierShown | None = None
 
 
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -388,7 +399,7 @@ def run_view(run: Run, *, recorded: bool = True, cache: ActionViewCache | None =
         behaviours=run.behaviours,
         actions=_actions(run, _LIVE, cache),
         log=_log(run, _LINES),
-        rests=_rests(run),
+        rests=msgspec.UNSET if run.led is None else rests_of(run),
     )
 
 
@@ -410,7 +421,7 @@ def whole_view(
         behaviours=run.behaviours,
         actions=actions,
         log=_log(run, len(run.log)),
-        rests=_rests(run),
+        rests=msgspec.UNSET if run.led is None else rests_of(run),
         umrf=msgspec.Raw(graph.umrf.encode()),
         override=run.override,
         despite=list(run.despite),
@@ -418,6 +429,7 @@ def whole_view(
         archived=archived(place),
         subgraphs=subgraphs_shown(graph),
         tree_digest=graph.tree_digest,
+        earlier=None if run.earlier is None else earlier_view(run.earlier, run.start_from),
     )
 
 
@@ -447,6 +459,9 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         watching=tuple(more["watching"]) if "watching" in more else msgspec.UNSET,
         values=msgspec.convert(more["values"], StartValues) if "values" in more else msgspec.UNSET,
         sent_digest=more.get("sent_digest") or msgspec.UNSET,
+        start_from=msgspec.convert(more["from"], StartFromShown)
+        if "from" in more
+        else msgspec.UNSET,
     )
 
 
@@ -539,6 +554,9 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "watching": run.watching or msgspec.UNSET,
         "values": run.values or msgspec.UNSET,
         "sent_digest": run.sent_digest or msgspec.UNSET,
+        "start_from": msgspec.UNSET
+        if run.start_from is None
+        else start_from_view(run.start_from, run.earlier),
     }
 
 
@@ -554,6 +572,8 @@ def _at_rest(seen: AtRest | None) -> AtRestShown | None:
     return None if seen is None else AtRestShown(seen.by, time(seen.at), seen.how)
 
 
+#: The states of a robot of which nothing moves any more.
+AT_REST: Final = frozenset({"unused", "proven", "seen", "unsent"})
 #: From the worst to the best.
 _WORST: Final = (
     "unproven",
@@ -568,11 +588,11 @@ _WORST: Final = (
 )
 
 
-def _rests(run: Run) -> list[RobotRestShown] | msgspec.UnsetType:
+def rests_of(run: Run) -> list[RobotRestShown]:
     """Return, for each robot of a led run, the state of its piece that is the furthest from
-    proven rest; unset for other runs."""
+    proven rest; none for other runs."""
     if run.led is None:
-        return msgspec.UNSET
+        return []
     found: dict[str, list[RobotRestShown]] = {
         robot: [] for robot in sorted(set(run.led.players.values()))
     }

@@ -14,6 +14,7 @@ from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.links.simulator import slowed
 from action_assistant.runner.robots.rights import Claim
+from action_assistant.runner.runs.earlier import StartFrom
 from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.runs.sent_graphs import (
     Inner,
@@ -25,6 +26,7 @@ from action_assistant.runner.runs.sent_graphs import (
     tree_of,
 )
 from action_assistant.runner.start.piece_texts import PieceText, texts_of
+from action_assistant.runner.start.start_from import Beginning, EarlierRun, beginning
 from action_assistant.umrf.breakpoints import Breakpoint, NoSuchPlace, pinned
 from action_assistant.umrf.check import blocking, check, forbids_start, is_final
 from action_assistant.umrf.checks.actors import led_problems
@@ -72,7 +74,13 @@ _MOST_ENGINES: Final = 20  # of one group
 _MOST_KEPT: Final = 40  # errors, and warnings, that a prepared start keeps
 
 
-class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class StartRequest(
+    msgspec.Struct,
+    frozen=True,
+    forbid_unknown_fields=True,
+    kw_only=True,
+    rename={"start_from": "from"},
+):
     """A start: the version by value, and the engine that runs it.
 
     `digest` is that of the graph that the person saw; `request_id` is made by the client, once per
@@ -85,6 +93,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
     version, as the editor seals them; without it, where there are rules, the run is for its starter
     and owners. `values`: those of inputs for which the graph asks; its digest stays that without them.
+    `from`: where it begins, if not at the entry.
     """
 
     version: str
@@ -106,6 +115,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     sight: Sight | None = None
     breakpoints: Breakpoints = ()
     values: StartValues = {}
+    start_from: StartFrom | None = None
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -165,7 +175,13 @@ class WordRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     request_id: _PressId = ""
 
 
-class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class GroupRequest(
+    msgspec.Struct,
+    frozen=True,
+    forbid_unknown_fields=True,
+    kw_only=True,
+    rename={"start_from": "from"},
+):
     """One version for several robots at once. Without version, digest and `request_id` it is only
     good for a pre-flight."""
 
@@ -187,6 +203,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     sight: Sight | None = None
     breakpoints: Breakpoints = ()
     values: StartValues = {}
+    start_from: StartFrom | None = None
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -211,13 +228,26 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             sight=self.sight,
             breakpoints=self.breakpoints,
             values=self.values,
+            start_from=self.start_from,
         )
+
+
+class AskedInputsRequest(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"start_from": "from"}
+):
+    """A graph, of which the inputs are wanted for which a start asks. `from`: where that begins, if not
+    at the entry; `graph`: the id of the graph, if it takes values of an earlier run."""
+
+    umrf: SentGraph
+    graph: str | None = None
+    start_from: StartFrom | None = None
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     """A start whose graph passed all checks. `graph`: with the values of the start, `sent_digest` its
     digest; `digest`: that of the version. `problems`: warnings, and those that forbid a start and are
-    overridden. `beyond`: values change what the version itself gives."""
+    overridden. `beyond`: values, or a part that is played alone, change what the version itself says.
+    `beginning`: where it begins, None for the entry."""
 
     graph: Graph
     graph_id: str | None
@@ -229,6 +259,7 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     inside: dict[str, Graph] = {}
     sent_digest: str = ""
     beyond: bool = False
+    beginning: Beginning | None = None
 
 
 class Prepared(msgspec.Struct, frozen=True, kw_only=True):
@@ -237,7 +268,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
     `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one; `handing`:
     the arrows by which these hand values to others. `digest`, `tree_digest`: of the version;
-    `sent_digest`, `beyond`: as of `Admitted`."""
+    `sent_digest`, `beyond`, `beginning`: as of `Admitted`, the last without its graph."""
 
     run: str
     name: str
@@ -256,6 +287,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     handing: tuple[Obstacle, ...] = ()
     sent_digest: str = ""
     beyond: bool = False
+    beginning: Beginning | None = None
 
 
 def watched_in(watching: Watching, robots: Collection[str]) -> tuple[str, ...]:
@@ -294,9 +326,15 @@ def decoded(body: bytes, kind: type[T]) -> T:
         raise BadInput(message, where=where) from error
 
 
-def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
+def admit(
+    request: StartRequest,
+    facts: EngineFacts,
+    *,
+    approved: bool = True,
+    earlier: EarlierRun | None = None,
+) -> Admitted:
     """Check the graphs of a start request, and return them as read. If the start is not `approved`,
-    its digests may be missing. Raise NotUmrf if a text is no UMRF graph, Conflict if a digest
+    its digests may be missing. `earlier`: the run from which it takes outcomes. Raise NotUmrf if a text is no UMRF graph, Conflict if a digest
     differs or a problem forbids the start, TooLarge if the graphs are too large, BadInput for
     another fault of the request. Except for its size, a graph is refused only for problems that its
     checks show too."""
@@ -313,9 +351,13 @@ def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -
         request.subgraphs, found, request.tree_digest, approved=approved
     )
     _check_size(text, reading.graph, subgraphs, inside)
-    graph = _given(reading.graph, request.values)
-    graph_problems = check(graph, None, facts, inside)
-    problems = [*reading.problems, *reading.placed(graph_problems)]
+    begins = _beginning(request, reading.graph, tree_of(found, subgraphs), earlier)
+    if begins is None:
+        graph = _given(reading.graph, request.values)
+        problems = [*reading.problems, *reading.placed(check(graph, None, facts, inside))]
+    else:
+        graph = begins.graph if begins.before else _given(begins.graph, request.values)
+        problems = [*reading.problems, *check(graph, None, facts, inside)]
     _check_problems(problems, request.override)
     script, script_text = _script(request)
     return Admitted(
@@ -324,8 +366,9 @@ def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -
         script=script,
         script_text=script_text,
         digest=found,
-        sent_digest=digest(graph) if request.values else found,
-        beyond=_is_beyond(reading.graph, request.values),
+        sent_digest=digest(graph) if request.values or begins is not None else found,
+        beyond=_is_beyond(reading.graph, request.values) or (begins is not None and begins.is_part),
+        beginning=begins,
         problems=tuple(problems),
         subgraphs=subgraphs,
         inside=inside,
@@ -333,11 +376,16 @@ def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -
 
 
 def prepared(
-    request: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
+    request: StartRequest,
+    facts: EngineFacts,
+    run: str,
+    *,
+    approved: bool = True,
+    earlier: EarlierRun | None = None,
 ) -> Prepared:
     """Admit a start and write the text that will be sent as this run. For workers: it takes long
-    with large graphs. Raises what `admit` raises."""
-    admitted = admit(request, facts, approved=approved)
+    with large graphs. Raises what `admit` raises. `earlier`: as of `admit`."""
+    admitted = admit(request, facts, approved=approved, earlier=earlier)
     graph = admitted.graph
     inside = [action for each in admitted.inside.values() for action in each.actions]
     overridden = list(filter(forbids_start, admitted.problems))
@@ -358,13 +406,32 @@ def prepared(
         tree_digest=tree_of(admitted.digest, admitted.subgraphs),
         sent_digest=admitted.sent_digest,
         beyond=admitted.beyond,
+        beginning=admitted.beginning
+        and msgspec.structs.replace(admitted.beginning, graph=Graph(name=graph.name)),
     )
 
 
-def asked_for(umrf: bytes) -> tuple[AskedInput, ...]:
-    """Return the inputs for which a start of a sent graph asks. For workers. Raise what `read_sent`
-    raises."""
-    return asked_inputs(read_sent(umrf)[1].graph)
+def _beginning(
+    request: StartRequest, graph: Graph, tree: str, earlier: EarlierRun | None
+) -> Beginning | None:
+    """Return where a start begins; None for the entry. Raise what `beginning` raises."""
+    start = request.start_from
+    if start is None:
+        return None
+    if start.continues and request.engine != CONDUCTED:
+        text = "Only a run that is led step by step is continued where it ended."
+        raise BadInput(text, where={"path": "/engine"})
+    return beginning(graph, tree, request.values, start, earlier)
+
+
+def asked_for(wanted: AskedInputsRequest, earlier: EarlierRun | None) -> tuple[AskedInput, ...]:
+    """Return the inputs for which a start of a sent graph asks; none if it continues a run, which has
+    its values. For workers. `earlier`: the run from which it takes outcomes. Raise what `read_sent` and
+    `beginning` raise."""
+    graph, start = read_sent(bytes(wanted.umrf))[1].graph, wanted.start_from
+    if start is None:
+        return asked_inputs(graph)
+    return () if start.continues else asked_inputs(beginning(graph, "", {}, start, earlier).graph)
 
 
 def _given(graph: Graph, values: StartValues) -> Graph:
@@ -446,7 +513,8 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     `players`: the robot of each action that a robot plays, by full name; `texts`: the pieces;
     `by_robot`: all actions of a robot as one graph without arrows, which is looked at
     before the start and never sent. `problems`: what leading the graph means; `remedies`: what
-    would take a problem away, by its code, as a sentence; `breakpoints`: where the run will wait.
+    would take a problem away, by its code, as a sentence; `breakpoints`: where the run will wait;
+    `robots`: those of the request that the graph needs, by actor.
     """
 
     whole: Prepared
@@ -456,6 +524,7 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     problems: tuple[Problem, ...]
     remedies: dict[str, str] = {}
     breakpoints: tuple[Breakpoint, ...] = ()
+    robots: dict[str, str] = {}
 
 
 def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
@@ -471,8 +540,9 @@ def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
 
 def order_of(request: StartRequest, tree_digest: str, codes: Collection[str]) -> str:
     """Return the digest of everything that a second person says yes to: the version (`tree_digest`), and
-    where there are any, the values, the robots of a led run with what happens when one is lost, and
-    the overridden `codes`. That of a start with nothing besides its graph is the tree digest."""
+    where there are any, the values, the robots of a led run with what happens when one is lost, the
+    overridden `codes`, and where it begins: the record of an earlier run, which is over, does not
+    change. That of a start with nothing besides its graph is the tree digest."""
     more: dict[str, Any] = {}
     if request.values:
         more["values"] = msgspec.to_builtins(request.values)
@@ -480,6 +550,8 @@ def order_of(request: StartRequest, tree_digest: str, codes: Collection[str]) ->
         more |= {"robots": request.robots, "lost": request.lost}
     if codes:
         more["override"] = sorted(set(codes))
+    if request.start_from is not None:
+        more["from"] = msgspec.to_builtins(request.start_from)
     if not more:
         return tree_digest
     return hashlib.sha256(rfc8785.dumps([tree_digest, more])).hexdigest()
@@ -491,14 +563,25 @@ def overridden_in(request: StartRequest) -> tuple[str, ...]:
 
 
 def prepared_pieces(
-    request: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
+    request: StartRequest,
+    facts: EngineFacts,
+    run: str,
+    *,
+    approved: bool = True,
+    earlier: EarlierRun | None = None,
 ) -> PreparedPieces:
     """Admit the start of a led run and write the texts of its pieces. For workers. Raises what
     `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for a
-    graph that cannot run as pieces."""
-    whole = prepared(request, facts, run, approved=approved)
+    graph that cannot run as pieces. `earlier`: as of `admit`."""
+    whole = prepared(request, facts, run, approved=approved, earlier=earlier)
     graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
-    _check_robots(request.robots, actors_in(graph, inside))
+    actors = actors_in(graph, inside)
+    if whole.beginning is not None:  # what is skipped needs no robot
+        robots = {actor: robot for actor, robot in request.robots.items() if actor in actors}
+        request = msgspec.structs.replace(request, robots=robots)
+    _check_robots(request.robots, actors)
+    if whole.beginning is not None and whole.beginning.before is not None:
+        _check_same_robots(request.robots, earlier)
     breakpoints = pinned_in(graph, request.breakpoints)
     hindering = (*subgraph_obstacles(graph, inside, request.robots), *obstacles(graph))
     if hindering:
@@ -525,7 +608,16 @@ def prepared_pieces(
         problems=tuple(problems),
         remedies=as_one_step(placed, problems, PINNED),
         breakpoints=breakpoints,
+        robots=request.robots,
     )
+
+
+def _check_same_robots(robots: Mapping[str, str], earlier: EarlierRun | None) -> None:
+    """Raise Conflict if a run is to be continued on other robots: they are not where it ended."""
+    led = earlier.first.led if earlier is not None else None
+    if earlier is not None and led is not None and dict(robots) != led.robots:
+        text = f"Run {earlier.first.number} had other robots: continue it on these, or begin anew."
+        raise Conflict(text, where={"path": "/robots"})
 
 
 def pinned_in(graph: Graph, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:

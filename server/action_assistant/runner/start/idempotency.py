@@ -10,6 +10,7 @@ import msgspec
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.earlier import StartFrom
 from action_assistant.runner.runs.events import Author, Ended, Requested, draft_of
 from action_assistant.runner.runs.fold import begin
 from action_assistant.runner.runs.history import RunnerJournal
@@ -74,13 +75,16 @@ class IdempotentStarts:
             return None
         row = rows[0]
         other_tree = request.tree_digest and row.tree_digest not in {None, request.tree_digest}
-        other_robots = (request.robots, request.lost) != (
-            row.summary.get("robots", {}),
-            row.summary.get("lost", request.lost),
-        )
+        start = row.summary.get("from")
+        known = {name: start[name] for name in start if name != "number"} if start else None
+        other_start = request.start_from != msgspec.convert(known, StartFrom | None)
+        robots = row.summary.get("robots", {})
+        # A part of a graph needs only the robots of its own actors.
+        wanted = {k: v for k, v in request.robots.items() if known is None or k in robots}
+        other_robots = (wanted, request.lost) != (robots, row.summary.get("lost", request.lost))
         other = (row.digest, row.engine) != (request.digest, request.engine)
         other_values = request.values != msgspec.convert(row.summary.get("values", {}), StartValues)
-        if other or other_tree or other_robots or other_values:
+        if other or other_tree or other_robots or other_values or other_start:
             raise Conflict(
                 "This request_id belongs to another start.", where={"path": "/request_id"}
             )

@@ -1,5 +1,6 @@
-"""The items of a pre-flight that only led runs have: what leading a graph means, which robots it moves, whether
-their owners allow it, and whether their engines may be asked as often as it asks.
+"""The items of a pre-flight about where a run begins, and those that only led runs have: what leading a
+graph means, which robots it moves, whether their owners allow it, and whether their engines may be
+asked as often as it asks.
 
 The last one is about hazard H15. An engine that reads its folders again while it is asked may
 abort, with all that runs there, and a led run asks often. Where the runner cannot see how an engine
@@ -15,10 +16,13 @@ import msgspec
 
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.port import Registration, Standing
+from action_assistant.runner.runs.earlier import StartFrom
+from action_assistant.runner.runs.earlier_views import earlier_view
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
-from action_assistant.runner.start.admission import PreparedPieces
-from action_assistant.runner.start.preflight import SHOWN, Item, Verdict, counted
+from action_assistant.runner.start.admission import Prepared, PreparedPieces
+from action_assistant.runner.start.preflight import SHOWN, Item, Preflight, Verdict, counted
+from action_assistant.runner.start.start_from import beginning_text, is_doubtful
 from action_assistant.umrf.facts import EngineFacts
 
 #: The stream of all words about indexing.
@@ -54,6 +58,27 @@ def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
                 )
             )
     return tuple(found)
+
+
+def beginning_items(ready: Prepared, start: StartFrom | None) -> tuple[Item, ...]:
+    """Return the items that say where a start begins and what it takes for granted; none for the
+    entry."""
+    begins = ready.beginning
+    if begins is None or start is None:
+        return ()
+    text = beginning_text(start, begins.earlier)
+    verdict: Verdict = "warned" if is_doubtful(begins.earlier) else "passed"
+    found = [Item(code="begins", verdict=verdict, text=text)]
+    if begins.lacks:
+        found.append(Item(code="choices", verdict="blocked", text=begins.lacks))
+    return tuple(found)
+
+
+def with_beginning(look: Preflight, ready: Prepared, start: StartFrom | None) -> Preflight:
+    """Return a pre-flight with what the start takes for granted."""
+    if ready.beginning is None:
+        return look
+    return msgspec.structs.replace(look, earlier=earlier_view(ready.beginning.earlier, start))
 
 
 def _moving(ready: PreparedPieces) -> Item:

@@ -29,6 +29,7 @@ from action_assistant.runner.index_folders.scan import IndexedFiles, scanned, sh
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import EngineIndex, foreign_graphs
+from action_assistant.runner.runs.earlier_views import EarlierShown
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Admitted, Prepared
@@ -75,7 +76,8 @@ class Preflight(msgspec.Struct, frozen=True):
     """The pre-flight of a graph on one engine. `override`: the codes that a person would have to
     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
     `tree_digest`: of it together with the graphs inside; `order_digest`: of all that a second person
-    says yes to, "" where nobody has to."""
+    says yes to, "" where nobody has to; `earlier`: what the start takes for granted, on the first engine
+    of it, null if it begins at the entry."""
 
     engine: str
     digest: str
@@ -84,6 +86,7 @@ class Preflight(msgspec.Struct, frozen=True):
     override: tuple[str, ...]
     never: bool
     order_digest: str = ""
+    earlier: EarlierShown | None = None
 
 
 class Settled(msgspec.Struct, frozen=True):

@@ -163,7 +163,11 @@ class RightsRegistry:
             is_released = self._release_of(claim.digest) is not None
             if is_released and not claim.beyond:
                 return ()
-            what = "this changes values in one" if is_released else "this is none of them"
+            what = (
+                "this changes values in one, or is a part of one"
+                if is_released
+                else "this is none of them"
+            )
             why = f"{robot} takes only versions that an owner has released, and {what}."
         except Unavailable as unread:
             why = f"{robot} takes only versions that an owner has released. {unread.detail}"

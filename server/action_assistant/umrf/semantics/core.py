@@ -10,7 +10,7 @@ from math import inf
 from msgspec.structs import replace
 
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.model import OUTCOMES, Graph
+from action_assistant.umrf.model import PRECONDITIONS, Graph
 from action_assistant.umrf.semantics.clock import Clock, Task
 from action_assistant.umrf.semantics.parts import (
     HELD,
@@ -46,7 +46,7 @@ INSTANT_LAPS = 3
 #: More bypasses than this at one instant, plus ten for each action, mean that they go round in a circle.
 BYPASSES = 1_000
 
-_OUTCOMES: dict[str, Outcome] = {outcome: outcome for outcome in OUTCOMES}
+_OUTCOMES: dict[str, Outcome] = {outcome: outcome for outcome in PRECONDITIONS}
 
 
 class Core(Clock):

@@ -35,7 +35,8 @@ class Call(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Returned(msgspec.Struct, frozen=True, kw_only=True):
-    """The end of a call, sent when none of its code runs any more. `result`: one of `OUTCOMES`.
+    """The end of a call, sent when none of its code runs any more. `result`: one of `OUTCOMES`, or
+    `on_stopped` if something else than the graph has stopped it.
 
     `outputs`: the values of outputs, of the types that the call named, by flat name; `unset`: outputs
     that are known to have none, others get their default. `message`: a text about the end for people.
