@@ -86,6 +86,8 @@ export interface StartOrder {
   breakpoints?: readonly RunBreakpoint[];
   /** Of the inputs for which the graph asks. */
   values?: NonNullable<Run["values"]>;
+  /** Where it begins, if not at the entry. */
+  from?: RunnerApi["StartFrom"];
 }
 
 /** True for each robot that a person says to watch. */
@@ -133,6 +135,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.drill === true ? { drill: true } : {}),
     ...asBreakpoints(order.breakpoints),
     ...(order.values === undefined ? {} : { values: order.values }),
+    ...(order.from === undefined ? {} : { from: order.from }),
     umrf: order.umrf,
     ...order.inside,
   };

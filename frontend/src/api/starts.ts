@@ -12,6 +12,10 @@ export type Approval = RunnerApi["Approval"];
 export type AskedInput = RunnerApi["AskedInput"];
 /** Values of a start, by the full name of the action and the flat name of the input. */
 export type StartValues = RunnerApi["ApprovalWanted"]["values"];
+/** Where a start begins, if not at the entry. */
+export type StartFrom = RunnerApi["StartFrom"];
+/** All that a start takes for granted then. */
+export type Earlier = RunnerApi["EarlierShown"];
 export type StartValue = StartValues[string][string];
 /** A person's question for the yes of others to a start. */
 export type ApprovalWanted = RunnerApi["ApprovalWanted"];
@@ -19,10 +23,14 @@ export type ApprovalWanted = RunnerApi["ApprovalWanted"];
 /** Fetch for which inputs a start of a graph asks. */
 export function fetchAskedInputs(
   runner: string,
-  umrf: string,
+  what: { graph: string; umrf: string; from?: StartFrom | undefined },
   signal: AbortSignal,
 ): Promise<AskedInput[]> {
-  return runnerAt(runner).post("/api/asked_inputs", { body: { umrf }, signal });
+  const { from, ...body } = what;
+  return runnerAt(runner).post("/api/asked_inputs", {
+    body: { ...body, ...(from && { from }) },
+    signal,
+  });
 }
 
 /** Values that a graph was started with before. */
@@ -94,6 +102,7 @@ export function runPreflight(
     drill: boolean;
     breakpoints: readonly RunBreakpoint[];
     values: StartValues;
+    from?: StartFrom;
   },
   signal: AbortSignal,
 ): Promise<Preflight[]> {

@@ -56,6 +56,9 @@ const RunSteering = boundedPart(
   () => import("../runs/run-steering").then((part) => part.RunSteering),
   { waiting: null },
 );
+const BeginDialog = lazyPart(() =>
+  import("../runs/start/begin-dialog").then((part) => part.BeginDialog),
+);
 const RecordDryRun = lazyPart(() =>
   import("../runs/start/record-dry-run").then((part) => part.RecordDryRun),
 );
@@ -203,6 +206,7 @@ function Inside({ id }: { id: string }) {
         status={<Draft run={inside === null ? live : null} label={label} settle={settle} />}
         start={mayStart && <Start settle={settle} />}
         record={mayStart && <Record />}
+        begin={mayStart && <Begin settle={settle} run={run} />}
         strip={
           <Strip
             run={run}
@@ -238,6 +242,17 @@ function Start({ settle }: Settled) {
   const name = graph.name || "untitled";
   const more = { asks: asks !== "", compact, thumb: phone };
   return <StartControl {...{ graph: id, name, seq, settle, obstacle, ...more }} />;
+}
+
+/** The look before a run of a part of the graph. */
+function Begin({ settle, run }: Settled & { run: Run | null | undefined }) {
+  const { id, graph, obstacle, beginning, endBeginning } = useEditorSummary();
+  if (beginning === null) return null;
+  const name = graph.name || "untitled";
+  const { at, only } = beginning;
+  return (
+    <BeginDialog {...{ graph: id, name, settle, obstacle, at, only, run, onClose: endBeginning }} />
+  );
 }
 
 /** Records the open dry-run as a run, by the decisions that were made in it. */

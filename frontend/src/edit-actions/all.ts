@@ -6,6 +6,7 @@ import { DRY_RUN } from "./dry-run-actions";
 import type { EditAction } from "./edit-action";
 import * as folding from "./folding";
 import * as notes from "./notes";
+import * as partial from "./partial-runs";
 import * as graph from "./share";
 import * as look from "./view";
 
@@ -14,6 +15,7 @@ export * from "./breakpoints";
 export * from "./draw";
 export * from "./folding";
 export * from "./notes";
+export * from "./partial-runs";
 export * from "./share";
 export * from "./view";
 
@@ -72,6 +74,8 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   ...look.PANELS,
   look.showShortcuts,
   ...DRY_RUN,
+  partial.runFrom,
+  partial.runOnly,
   graph.exportUmrf,
   graph.exportSvg,
   graph.exportPng,

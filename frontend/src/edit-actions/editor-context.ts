@@ -75,6 +75,8 @@ export type Overlay =
       readonly name: string;
       readonly uses: readonly string[];
     }
+  /** A run that begins with these actions, by full name; `only`: it plays nothing else. */
+  | { readonly kind: "begin"; readonly at: readonly string[]; readonly only: boolean }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
 
@@ -125,6 +127,8 @@ export interface EditorContext {
   readonly canRedo: boolean;
   /** True if this person may change what is shown; else every edit action that changes it is off. */
   readonly mayEdit: boolean;
+  /** True if this person may start runs, be it in the simulator. */
+  readonly mayRun: boolean;
   /** Keys of actions and ends, ids of relations. */
   readonly selection: ReadonlySet<string>;
   readonly tool: Tool;

@@ -187,6 +187,9 @@ interface EditorSummary {
   /** True if the strip shows only its head; null on a phone, where it has a pane of its own. */
   folded: boolean | null;
   fold: (folded: boolean) => void;
+  /** A run of a part of the graph that a person asks for; null for none. */
+  beginning: { readonly at: readonly string[]; readonly only: boolean } | null;
+  endBeginning: () => void;
 }
 
 const EditorSummaryContext = createContext<EditorSummary | null>(null);
@@ -220,6 +223,8 @@ interface Props {
   /** The button that turns the open dry-run into a run. */
   record: ReactNode;
   corner: ReactNode;
+  /** The look before a start that does not begin at the entry. */
+  begin: ReactNode;
   /** The notice of a run that waits for a person, for a phone: elsewhere the strip shows it. */
   held?: ReactNode;
   /** The moment of a run at which a dry-run shall start; null without one. */
@@ -247,6 +252,7 @@ function useSummary(
   link: RoomLink,
   checked: Checked,
   place: EditorSummary["place"],
+  begins: Pick<EditorSummary, "beginning" | "endBeginning">,
 ): EditorSummary & { onPlacing: (placing: boolean) => void } {
   const [placing, setPlacing] = useState(false);
   const wide = useIsWide();
@@ -278,6 +284,7 @@ function useSummary(
     phone,
     folded: phone ? null : folded,
     fold: setFolded,
+    ...begins,
   };
 }
 
@@ -383,7 +390,9 @@ export function Editor(props: Props) {
   const place = (template: NewAction) => {
     if (placeAction(context, template)) panels.setLeft(false);
   };
-  const summary = useSummary(context, link, { seq: problems?.seq, told }, place);
+  const beginning = overlay?.kind === "begin" ? overlay : null;
+  const begins = { beginning, endBeginning: editor.closeOverlay };
+  const summary = useSummary(context, link, { seq: problems?.seq, told }, place, begins);
   const { compact, phone } = summary;
   const stage = (
     <CanvasPane
@@ -437,6 +446,7 @@ export function Editor(props: Props) {
         ) : (
           <DesktopLayout {...parts} wide={!compact} told={told} list={props.list} />
         )}
+        {beginning !== null && props.begin}
       </EditorSummaryContext>
       <RoomNotices />
       <LateParts />

@@ -68,6 +68,7 @@ function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   const now = useThrottledGraph();
   const undoable = useUndo();
   const role = useMay("edit");
+  const mayRun = useMay("simulate");
   const { readOnly, seq } = useThrottledLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, now, seq);
   // Nobody may edit before the graph has arrived: an edit would not know what it replaces.
@@ -81,9 +82,23 @@ function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   return useMemo(
     () => ({
       ...{ id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun },
-      ...{ past, lookAt, mayGoBack },
+      ...{ past, lookAt, mayGoBack, mayRun },
     }),
-    [id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun, past, lookAt, mayGoBack],
+    [
+      id,
+      doc,
+      undo,
+      graph,
+      canUndo,
+      canRedo,
+      mayEdit,
+      dryRun,
+      beginDryRun,
+      past,
+      lookAt,
+      mayGoBack,
+      mayRun,
+    ],
   );
 }
 

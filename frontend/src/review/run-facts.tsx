@@ -10,6 +10,7 @@ import { actorWords } from "../api/people";
 import { type RunMarks, setMarks, useLabels, useMarks, useRaw } from "../api/review";
 import { type Run, requesterPlace, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
+import { fromWords } from "../status/earlier-list";
 import { runEndText } from "../status/progress";
 import { valuesWords } from "../status/value-words";
 import { useDraft } from "../ui/drafts";
@@ -43,6 +44,7 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ["Graph", run.graph_name],
     ["Version", version],
     ["Digest", run.digest],
+    ...(run.from ? [["Began", fromWords(run.from)] as [string, string]] : []),
     ...(run.values ? [["Started with", valuesWords(run.values)] as [string, string]] : []),
     ...(run.sent_digest ? [["Digest with that", run.sent_digest] as [string, string]] : []),
     ["Engine", runPlace(run)],

@@ -5,6 +5,7 @@ import {
   IconBug,
   IconChevronDown,
   IconPlayerPlay,
+  IconPlayerSkipForward,
   IconPlayerTrackNext,
   IconRepeat,
   IconShieldCheck,
@@ -20,6 +21,7 @@ import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from
 import { getRun } from "../api/run-stop";
 import { type Inside, type Run, startRun } from "../api/runs";
 import { memberText } from "../graph/json-members";
+import { type Beginning, canContinue } from "../status/earlier-list";
 import { actionWords } from "../status/level-places";
 import { Segments } from "../ui/segments";
 import { isolated } from "../words/isolated";
@@ -34,6 +36,8 @@ export interface RepeatActions {
   /** The engine of each actor; of a led run. */
   robots?: Run["robots"];
   values?: Run["values"] | undefined;
+  /** Where it begins, if not at the entry. */
+  beginning?: Beginning | undefined;
 }
 
 interface Props {
@@ -153,8 +157,9 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const simulate = (which: RepeatedVersion) => {
     if (runner !== undefined) repeatRun(runner, run, which).then(show, complain);
   };
-  const start = (seq: number) =>
-    onStart({ graph, name: run.graph_name, seq, engines, robots: run.robots, values: run.values });
+  const again = { graph, name: run.graph_name, engines, robots: run.robots, values: run.values };
+  const start = (seq: number) => onStart({ ...again, seq });
+  const beginning = { run: run.id, number: run.number, at: [], only: false };
   const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);
   const close = () => setDialog(null);
   return (
@@ -188,6 +193,15 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
               >
                 The newest version …
               </Menu.Item>
+              {canContinue(run) && (
+                <Menu.Item
+                  leftSection={<IconPlayerSkipForward size={15} aria-hidden />}
+                  disabled={version === undefined}
+                  onClick={() => version && onStart({ ...again, seq: version.seq, beginning })}
+                >
+                  Continue where it ended …
+                </Menu.Item>
+              )}
             </>
           )}
           <RepeatItems

@@ -4,6 +4,7 @@ import { actorWords } from "../api/people";
 import { type Run, requesterPlace, runPlace, type Visit } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
+import { fromWords } from "../status/earlier-list";
 import { actionWords } from "../status/level-places";
 import { howWords, progressOf, runEndText, visitDuration } from "../status/progress";
 import { useUnsure } from "../status/silence";
@@ -109,6 +110,7 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
       facts={[
         ["Version", version],
         ["Digest", run.digest],
+        ...(run.from ? [["Began", fromWords(run.from)] as const] : []),
         ...(run.values ? [["Started with", valuesWords(run.values)] as const] : []),
         ...(run.sent_digest ? [["Digest with that", run.sent_digest] as const] : []),
         ["Robot", runPlace(run)],

@@ -28,6 +28,7 @@ import {
 import { hasEnded } from "../api/run-stop";
 import { type Run, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
+import { fromWords } from "../status/earlier-list";
 import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { valuesWords } from "../status/value-words";
@@ -77,6 +78,7 @@ function Marks({ run }: { run: ListedRun }) {
           {each}
         </span>
       ))}
+      {run.from && <span className={style.cause}>{fromWords(run.from)}</span>}
       {run.values && (
         <span className={style.cause} title={valuesWords(run.values)}>
           with {valuesWords(run.values)}

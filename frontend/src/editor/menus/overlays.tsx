@@ -91,7 +91,8 @@ function OpenOverlay({ context, known, overlay, onClose }: Props) {
       return <CommandPalette context={context} onClose={onClose} />;
     case "keys":
       return <ShortcutSheet onClose={onClose} />;
-    case "note":
-      return null; // edited on the canvas itself
+    case "note": // edited on the canvas itself
+    case "begin": // the page provides it, with the runs
+      return null;
   }
 }

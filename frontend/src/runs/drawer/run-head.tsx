@@ -21,6 +21,7 @@ import { needsRestConfirmation } from "../../api/run-stop";
 import { abilitiesOf, pauseRun, type Run, resumeRun } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import { boundsText } from "../../status/durations";
+import { fromWords } from "../../status/earlier-list";
 import { useRunStatus } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { WaitButton } from "../../status/wait-button";
@@ -29,6 +30,7 @@ import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { colorOfName } from "../../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../../ui/times";
 import { isolated } from "../../words/isolated";
+import { ContinueButton } from "../start/begin-dialog";
 import style from "./run-drawer.module.css";
 
 const ConfirmRestDialog = lazyPart(() =>
@@ -108,6 +110,7 @@ function Origin({ run, until }: { run: Run; until: number | null }) {
   return (
     <Text span c="dimmed" size="xs" truncate>
       {run.simulated && "simulated · "}
+      {run.from && `${fromWords(run.from)} · `}
       started by {isolated(by)} {started} · {took}
     </Text>
   );
@@ -181,6 +184,7 @@ export function RunHead(props: Props) {
         {goes && !run.robots && <ConfirmRestButton key={run.id} run={run} />}
         {goes && <PauseButton run={run} />}
         <WaitButton run={run} />
+        {!goes && <ContinueButton key={run.id} run={run} />}
         <Ways run={run} />
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
       </span>

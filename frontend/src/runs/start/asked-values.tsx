@@ -11,6 +11,7 @@ import {
   type AskedInput,
   fetchAskedInputs,
   fetchWantedApprovals,
+  type StartFrom,
   type StartValues,
 } from "../../api/starts";
 import { useEarlierValues } from "../../status/earlier-values";
@@ -31,12 +32,13 @@ const NOTHING: readonly AskedInput[] = [];
 const NO_VALUES: StartValues = {};
 
 /** Query what is known of values before a form is shown. */
-function useKnown(graph: string, umrf: string | undefined) {
+function useKnown(graph: string, umrf: string | undefined, from: StartFrom | undefined) {
   const { runner } = useLive();
   const { person } = usePerson();
   const asked = useQuery({
-    queryKey: ["asked inputs", runner, umrf],
-    queryFn: ({ signal }) => fetchAskedInputs(runner ?? "", umrf ?? "", signal),
+    queryKey: ["asked inputs", runner, umrf, from],
+    queryFn: ({ signal }) =>
+      fetchAskedInputs(runner ?? "", { graph, umrf: umrf ?? "", from }, signal),
     enabled: runner !== undefined && umrf !== undefined,
     staleTime: Number.POSITIVE_INFINITY,
     gcTime: 0,
@@ -92,8 +94,9 @@ export function useAskedValues(
   umrf: string | undefined,
   before: StartValues | undefined,
   onChange: () => void,
+  from?: StartFrom,
 ): AskedValues {
-  const known = useKnown(graph, umrf);
+  const known = useKnown(graph, umrf, from);
   const { earlier, wanted } = known;
   const asked = known.asked ?? NOTHING;
   const [edited, edit] = useState<Drafts>({});

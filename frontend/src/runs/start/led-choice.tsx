@@ -146,6 +146,7 @@ export function WayChoice({ led, several, onLed }: WayProps) {
 }
 
 interface LedChoiceProps {
+  /** Empty where the robots cannot be chosen. */
   actors: readonly string[];
   cast: Cast;
   lost: LedOrder["lost"];
@@ -175,7 +176,7 @@ export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps
   const off = now.engines.filter(({ led, simulated }) => !simulated && !led);
   return (
     <>
-      <fieldset className={style.part}>
+      <fieldset className={style.part} hidden={actors.length === 0}>
         <legend>Who plays whom</legend>
         <div className={style.cast}>
           {actors.map((actor) => (

@@ -1,7 +1,7 @@
 /** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
 import { Button, Checkbox, Modal, Text, Textarea } from "@mantine/core";
 import { IconPlayerPlayFilled, IconRefresh, IconUserCheck } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
@@ -14,10 +14,11 @@ import { useMay, usePerson } from "../../api/people";
 import { useRight } from "../../api/rights";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run, Watching } from "../../api/runs";
-import { runPreflight, type StartValues } from "../../api/starts";
+import { runPreflight, type StartFrom, type StartValues } from "../../api/starts";
 import { type RunBreakpoint, startBreakpoints } from "../../graph/breakpoints";
 import { mapsFrom } from "../../graph/document-keys";
 import { readGraph } from "../../graph/read";
+import { type Beginning, beginningWords } from "../../status/earlier-list";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
@@ -32,6 +33,7 @@ import { actorsIn, castObstacle, castOf, LedChoice, movesWords, WayChoice } from
 import { PreflightList } from "./preflight-list";
 import { SecondPerson } from "./second-person";
 import style from "./start-dialog.module.css";
+import { useStartFrom } from "./start-from";
 import { lastLed, rememberEngines, rememberLed, useStart } from "./use-start";
 
 interface Props {
@@ -44,6 +46,8 @@ interface Props {
   robots?: LedOrder["robots"] | null | undefined;
   /** Values to begin with: of the run that is started once more. */
   values?: StartValues | undefined;
+  /** Where it begins, if not at the entry. */
+  beginning?: Beginning | undefined;
   onChosen: (engines: string[]) => void;
   onStarted?: (runs: readonly Run[]) => void;
   onClose: () => void;
@@ -92,6 +96,7 @@ function useLook(
     drill: boolean;
     breakpoints: readonly RunBreakpoint[] | undefined;
     values: StartValues | null;
+    from: StartFrom | undefined;
   },
 ) {
   const { runner } = useLive();
@@ -101,7 +106,8 @@ function useLook(
       const inside = await fetchInside(graph, seq, signal);
       const what = { graph, umrf: umrf ?? "", ...inside };
       const { breakpoints = [] } = said;
-      const all = { ...said, breakpoints, values: said.values ?? {} };
+      const { from, ...others } = said;
+      const all = { ...others, breakpoints, values: said.values ?? {}, ...(from && { from }) };
       return runPreflight(runner ?? "", what, engines, behaviours, led, all, signal);
     },
     enabled:
@@ -114,6 +120,8 @@ function useLook(
     gcTime: 0,
     staleTime: 0,
     retry: false,
+    // The questions stay while another answer to them is looked at.
+    ...(said.from && { placeholderData: keepPreviousData }),
   });
   const lookSoon = () => void look.refetch({ cancelRefetch: false });
   return { look, lookSoon, error: look.error };
@@ -296,7 +304,7 @@ function obstacleOf(
 }
 
 /** The way in which a graph is started, and the robots of a led start. */
-function useWay({ graph, seq, chosen, robots }: Props) {
+function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const { now } = useLive();
   const may = useMay("operate");
   const text = useText(graph, seq);
@@ -312,8 +320,9 @@ function useWay({ graph, seq, chosen, robots }: Props) {
   const [wanted, want] = useState<boolean | null>(chosen.includes(CONDUCTED) ? true : null);
   const mayLead = now.engines.some((robot) => robot.led);
   const waits = (marks.data?.length ?? 0) > 0;
-  const led = wanted ?? (several || waits);
-  const offered = several || waits || led || mayLead;
+  const continues = beginning?.at.length === 0;
+  const led = continues || (wanted ?? (several || waits));
+  const offered = !continues && (several || waits || led || mayLead);
   const cast = castOf(actors, picked, now.engines, may);
   const missing = led ? castObstacle(actors, cast) : null;
   const way = { text, marks, actors, several, led, want, offered };
@@ -321,7 +330,7 @@ function useWay({ graph, seq, chosen, robots }: Props) {
 }
 
 export function StartDialog(props: Props) {
-  const { graph, name, seq, label, chosen, onChosen, onStarted, onClose } = props;
+  const { graph, name, seq, label, chosen, beginning, onChosen, onStarted, onClose } = props;
   const [whole, setEngines] = useState<readonly string[]>(() => {
     const robots = chosen.filter((engine) => engine !== CONDUCTED);
     return robots.length > 0 ? robots : [SIMULATOR];
@@ -343,13 +352,20 @@ export function StartDialog(props: Props) {
   const mayDrill = !led && engines.length === 1 && !engines.includes(SIMULATOR);
   const [drills, setDrills] = useState(false);
   const breakpoints = way.marks.data;
-  const given = useAskedValues(graph, way.text.data, props.values, () => setReason(""));
-  const { values } = given;
-  const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints, values };
+  const { from, ...begins } = useStartFrom(
+    beginning,
+    `${textScope(graph, person.id)}continue/${beginning?.run ?? ""}`,
+  );
+  const place_ = beginning && { run: beginning.run, at: [...beginning.at], only: beginning.only };
+  const given = useAskedValues(graph, way.text.data, props.values, () => setReason(""), place_);
+  // A run is continued with its own values.
+  const values = beginning?.at.length === 0 ? (props.values ?? {}) : given.values;
+  const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints, values, from };
   const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
   const error = way.text.error ?? way.marks.error ?? given.error ?? lookError;
   const start = useStart(graph);
   const looks = look.data;
+  const earlier = looks?.find((each) => each.earlier)?.earlier;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
   const { digest = "", tree_digest: tree } = looks?.find((each) => each.digest !== "") ?? {};
   const why =
@@ -357,7 +373,11 @@ export function StartDialog(props: Props) {
       ? "The runner does not answer"
       : start.isPending
         ? "Starting …"
-        : (way.missing ?? given.obstacle ?? watch.obstacle ?? obstacleOf(engines, looks, reason));
+        : (way.missing ??
+          given.obstacle ??
+          watch.obstacle ??
+          begins.obstacle(earlier) ??
+          (look.isPlaceholderData ? "Looking …" : obstacleOf(engines, looks, reason)));
   const choose = (engine: string) => {
     setReason("");
     setDrills(false);
@@ -370,6 +390,7 @@ export function StartDialog(props: Props) {
     const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
     const done = ({ runs }: { runs: readonly Run[] }) => {
       setReason("");
+      begins.forget();
       onClose();
       onStarted?.(runs);
     };
@@ -391,13 +412,15 @@ export function StartDialog(props: Props) {
     };
     start.mutate({ ...what, ...override }, { onSuccess: done, onSettled });
   };
-  const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
+  // Of a part only some robots are looked at: those of the others are not needed.
+  const moving = beginning && looks ? engines.filter((each) => isLooked(looks, each)) : engines;
+  const where = moving.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   const how = led ? ", step by step," : "";
   return (
     <Modal
       opened
       onClose={onClose}
-      title={`Start ${isolated(label)} of ${isolated(name)}`}
+      title={`${beginning ? `${beginningWords(beginning)}:` : "Start"} ${isolated(label)} of ${isolated(name)}`}
       closeButtonProps={{ "aria-label": "Close" }}
       size="lg"
     >
@@ -414,7 +437,7 @@ export function StartDialog(props: Props) {
       )}
       {led ? (
         <LedChoice
-          actors={way.actors}
+          actors={beginning?.at.length === 0 ? [] : way.actors}
           cast={cast}
           lost={way.lost}
           onCast={(robots) => {
@@ -427,6 +450,7 @@ export function StartDialog(props: Props) {
         <Where engines={engines} behaviours={behaviours} onToggle={choose} />
       )}
       {choice}
+      {begins.part(earlier)}
       {given.form(lookError)}
       <WatchTicks watch={watch} />
       {asked.length > 0 && (
@@ -457,7 +481,7 @@ export function StartDialog(props: Props) {
             </Text>
           )}
           {!given.isIncomplete &&
-            (led ? [CONDUCTED, ...players.filter((each) => each !== SIMULATOR)] : engines).map(
+            (led ? [CONDUCTED, ...moving.filter((each) => each !== SIMULATOR)] : engines).map(
               (engine) => (
                 <PreflightList
                   key={engine}
@@ -501,8 +525,8 @@ export function StartDialog(props: Props) {
           name={name}
           label={label}
           digest={digest}
-          engines={engines}
-          moves={led && way.missing === null ? movesWords(cast) : ""}
+          engines={moving}
+          moves={led && way.missing === null ? movesWords(castFor(cast, moving)) : ""}
           values={values}
         />
         <HoldButton
@@ -513,13 +537,23 @@ export function StartDialog(props: Props) {
               ? `Start ${label}${how} on ${where.map(isolated).join(", ")}`
               : `Start ${label}: ${why}`
           }
-          question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(cast)}` : ""}`}
+          question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(castFor(cast, moving))}` : ""}`}
           disabled={why !== null}
           onHeld={begin}
         />
       </footer>
     </Modal>
   );
+}
+
+/** Return whether the look names an engine; the simulator of a led run has no look of its own. */
+function isLooked(looks: readonly Preflight[], engine: string): boolean {
+  return engine === SIMULATOR || looks.some((look) => look.engine === engine);
+}
+
+/** Return the actors that these engines play. */
+function castFor(cast: LedOrder["robots"], engines: readonly string[]): LedOrder["robots"] {
+  return Object.fromEntries(Object.entries(cast).filter(([, name]) => engines.includes(name)));
 }
 
 /** Return the values of a start as the end of a question. */

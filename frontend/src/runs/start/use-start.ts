@@ -9,7 +9,7 @@ import { insideOf } from "../../api/inside";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Started, type StartOrder, startRun, type Watching } from "../../api/runs";
-import type { StartValues } from "../../api/starts";
+import type { StartFrom, StartValues } from "../../api/starts";
 import { serverNow } from "../../clock/server-clock";
 import type { RunBreakpoint } from "../../graph/breakpoints";
 import { newAid } from "../../graph/document-keys";
@@ -40,6 +40,8 @@ export interface StartInput {
   breakpoints?: readonly RunBreakpoint[];
   /** Of the inputs for which the graph asks. */
   values?: StartValues;
+  /** Where it begins, if not at the entry. */
+  from?: StartFrom | undefined;
 }
 
 /** A moment as a version, and its graph exactly as the editor wrote it. */
@@ -70,7 +72,7 @@ export function useStart(graph: string) {
     mutationFn: async (wanted: StartInput) => {
       const { seq, engines, led, digest, tree, script, behaviours, override, watching, drill } =
         wanted;
-      const { breakpoints, values } = wanted;
+      const { breakpoints, values, from } = wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
@@ -98,6 +100,7 @@ export function useStart(graph: string) {
         ...(drill === undefined ? {} : { drill }),
         ...(breakpoints === undefined ? {} : { breakpoints }),
         ...(values === undefined ? {} : { values }),
+        ...(from === undefined ? {} : { from }),
       });
       for (const run of started.runs) live?.learn(run);
       return started;
