@@ -62,6 +62,7 @@ class FakeLink:
             newcomers=self._newcomers.among(
                 network.listeners("start"), servers, lambda: network.bystanders(self._path), now()
             ),
+            ids_unknown=network.ids_unknown,
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:

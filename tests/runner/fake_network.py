@@ -183,6 +183,7 @@ class FakeNetwork:
         self.feedback_s = 0.0
         self._shown_at = 0.0
         self.strangers = 0
+        self.ids_unknown = False
         self.born = 0
         self.nodes: list[Node] = []
         self.sent: list[tuple[float, Message]] = []

@@ -94,6 +94,7 @@ CODES: Final[Mapping[str, Severity]] = {
     "shared-memory-users": "warning",
     "robot-profile": "error",
     "robot-name": "warning",
+    "robot-unproven": "error",
     "robot-older": "error",
     "robot-middleware": "error",
     "robot-elsewhere": "error",

@@ -63,6 +63,7 @@ def proof(**standing: Any) -> Item:
         ({"listeners": {"start": 0, "stop": 0}}, "blocked", False, "start and stop messages"),
         ({"servers": 2}, "blocked", True, "2 engines answer"),
         ({"servers": 0}, "blocked", True, "nobody who serves"),
+        ({"ids_unknown": True}, "blocked", False, "no answer would prove a stop"),
         ({"generation": "unknown"}, "warned", False, "is not known"),
     ],
 )

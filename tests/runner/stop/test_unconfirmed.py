@@ -90,6 +90,22 @@ async def test_a_person_who_has_seen_it_at_rest_ends_it_and_that_is_no_proof() -
         assert "did not obey" in (await control.find(run)).detail
 
 
+@virtual
+async def test_where_ids_do_not_tell_processes_apart_a_stop_is_repeated_and_never_proven() -> None:
+    scene = RobotsInNetwork(5, script=STUBBORN | LATE, quirks=EngineTraits(loss=0.0))
+    async with scene.played() as control:
+        run = (await control.start(asked(), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        scene.network.ids_unknown = True
+        await control.stop(run, BEN)
+        await anyio.sleep(60)
+        now = shown(control, run)
+        assert (now.state, now.proof_at, now.ended_at) == ("stopping", None, None)
+        assert "does not show which process an answer comes from" in now.alarms[-1].text
+        stops = [each for _, each in scene.network.sent if isinstance(each, Stop)]
+        assert len(stops) > 5
+
+
 def _listed() -> Any:
     from action_assistant.runner.runs import queries
 

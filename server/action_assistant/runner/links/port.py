@@ -95,7 +95,8 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: other publishers of
     starts. `actor`: the name in its feedback, "" before any. `process`: the engine's, if on this
     computer. `indexes`: it reads its folders again while it runs, so that asking it then may end it
-    (H15); None if that is not known. `incarnation` changes when it is restarted."""
+    (H15); None if that is not known. `incarnation` changes when it is restarted. `ids_unknown`: the
+    ids that the middleware gives to endpoints do not show which process they belong to."""
 
     state: EngineState
     why: str = ""
@@ -108,11 +109,14 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     process: EngineProcess | None = None
     newcomers: tuple[str, ...] = ()
     indexes: bool | None = None
+    ids_unknown: bool = False
 
     @property
     def doubt(self) -> str:
         """Return why an answer of this engine proves nothing, as a clause; "" when an answer is a
         proof."""
+        if self.ids_unknown:
+            return "the middleware does not show which process an answer comes from"
         if self.servers != 1:
             return f"{self.servers or 'no'} engines are seen on the path of its answers"
         if not self.newcomers:

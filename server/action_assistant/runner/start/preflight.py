@@ -278,6 +278,9 @@ def _proof(view: EngineView) -> Item:
     """Check that one engine answers, hears commands, and speaks this generation of messages: a Stop
     can be proven."""
     standing, name = view.standing, view.name
+    if standing.ids_unknown:
+        text = f"For {name}, {standing.doubt}: no answer would prove a stop. See `doctor`."
+        return Item(code="proof", verdict="blocked", text=text)
     if standing.generation == "older":
         text = (
             f"{name} speaks an older generation of temoto_msgs: it would not understand a Stop. "

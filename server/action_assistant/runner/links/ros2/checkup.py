@@ -256,6 +256,14 @@ def _likely(
 def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
     """Return the finding about one robot. `standing`: the condition of its engine, as discovery
     shows it; `elsewhere`: engines on other domains that may be the engine of this robot."""
+    if standing.ids_unknown:
+        return found(
+            "robot-unproven",
+            robot.name,
+            "This middleware does not show which process an answer comes from: starts are refused, and "
+            "no Stop can be proven.",
+            "Start runner and engine with RMW_IMPLEMENTATION=rmw_fastrtps_cpp or rmw_cyclonedds_cpp.",
+        )
     if standing.generation == "older":
         return found(
             "robot-older",

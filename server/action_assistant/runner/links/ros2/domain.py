@@ -93,7 +93,10 @@ class Domain:
         )
         self.outlets = Outlets(self._node, topics)
         self._listen()
-        self.process, self.own_hash = self._know_ourselves()
+        own = self._know_ourselves()
+        self.process, self.own_hash = own[0].process, own[0].type_hash
+        #: The ids of this process's own endpoints do not share a part, so no process can be told by it.
+        self.ids_unknown = len({each.process for each in own}) > 1
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name=f"ros2-{number}", daemon=True)
@@ -200,18 +203,20 @@ class Domain:
         ends = (_endpoint(info) for info in found)
         return tuple(each for each in ends if each.process != self.process)
 
-    def _know_ourselves(self) -> tuple[str, str]:
-        """Return the gid prefix of this process and the type hash of its start messages, as others
-        see them. Raise RuntimeError if the middleware does not show them in time."""
-        name, deadline = (
-            self._node.get_fully_qualified_name().lstrip("/"),
-            time.monotonic() + _JOIN_S,
-        )
+    def _know_ourselves(self) -> tuple[Endpoint, ...]:
+        """Return this process's publisher of starts and its subscriptions to starts and feedback, as
+        others see them. Raise RuntimeError if the middleware does not show them in time."""
+        node, topics = self._node, self.topics
+        name, deadline = node.get_fully_qualified_name().lstrip("/"), time.monotonic() + _JOIN_S
         while time.monotonic() < deadline:
-            for info in self._node.get_publishers_info_by_topic(self.topics.start):
-                if info.node_name == name:
-                    own = _endpoint(info)
-                    return own.process, own.type_hash
+            shown = (
+                node.get_publishers_info_by_topic(topics.start),
+                node.get_subscriptions_info_by_topic(topics.start),
+                node.get_subscriptions_info_by_topic(topics.feedback),
+            )
+            own = [_endpoint(info) for ends in shown for info in ends if info.node_name == name]
+            if len(own) == len(shown):
+                return tuple(own)
             time.sleep(0.01)
         raise RuntimeError("the middleware does not show this process to itself")
 

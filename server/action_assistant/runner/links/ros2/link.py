@@ -177,6 +177,10 @@ class Ros2Link:
         return domain
 
     def _listened_to(self, domain: Domain, topic: str) -> None:
+        if domain.ids_unknown:
+            raise NotSent(
+                f"the middleware does not show whether the engine of {self._name} listens to {topic}"
+            )
         if not belonging(domain.servers(self._path), domain.listeners(topic)):
             raise NotSent(f"nobody listens to {topic} on domain {self._number}")
 
@@ -309,6 +313,7 @@ class Ros2Link:
                     lambda: domain.bystanders(self._path),
                     time.monotonic(),
                 ),
+                ids_unknown=domain.ids_unknown,
             )
         )
 
@@ -317,6 +322,11 @@ class Ros2Link:
         joined = f"This runner has just joined domain {self._number} and looks around."
         if not servers and not domain.settled:
             return "gone", joined
+        if not servers and domain.ids_unknown:
+            return "gone", (
+                f"Nobody is seen on {place}, and the ids of this middleware do not tell processes apart, "
+                "so no robot can be reached over it: RMW_IMPLEMENTATION has to name Fast DDS or Cyclone DDS."
+            )
         if not servers:
             others = domain.paths()
             hint = f" Engines answer on {', '.join(others)}." if others else ""
