@@ -85,7 +85,7 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
           <bdi>{taken.author.name || "somebody"}</bdi> asks
           {taken.digest === digest
             ? "."
-            : ": the graph, its robots, or what is started in spite of a check differ."}
+            : ": the graph, its robots, where it begins, or what is started in spite of a check differ."}
         </Text>
       )}
       {may && !mine && (
