@@ -128,3 +128,44 @@ def test_a_prepared_fork_server_has_what_was_imported_and_nothing_that_was_open(
 
 def test_a_fork_server_that_was_not_prepared_is_a_new_interpreter() -> None:
     assert found_by_workers(prepared=False) == [ANEW, ANEW]
+
+
+_OWNED: Final = """
+import _thread, colorsys, os, socket, time
+import anyio
+from action_assistant.web.workers import lanes
+from web.workers import worker_looks
+
+held = [socket.socketpair() for _ in range(50)]
+if {threads}:
+    _thread.start_new_thread(time.sleep, (60,))  # `threading` does not know of it
+lanes.start_fork_server(())
+
+async def main():
+    lane = lanes.Lane("try", 1, 30, 0, anyio.CapacityLimiter(4), ())
+    first = await lane(os.getpid)
+    if not {threads}:
+        await lane(worker_looks.forget)
+    print(first == await lane(os.getpid), (await lane(worker_looks.look, 0, "")).split(",")[0])
+    lane.close()
+
+anyio.run(main)
+"""
+
+
+@pytest.mark.parametrize("threads", [False, True], ids=["sockets", "and a thread"])
+def test_what_a_process_had_open_when_it_forked_the_fork_server_harms_no_worker(
+    threads: bool,
+) -> None:
+    """Objects of it live on in workers: they must close no descriptor that a worker was given. A
+    process with threads is not forked at all."""
+    done = subprocess.run(
+        [sys.executable, "-c", _OWNED.format(threads=threads)],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        capture_output=True,
+        check=False,
+        text=True,
+        timeout=100,
+    )
+    found = f"True imports {'anew' if threads else 'shared'}\n"
+    assert (done.stdout, done.returncode) == (found, 0), done.stderr

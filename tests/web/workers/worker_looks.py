@@ -21,3 +21,9 @@ def look(opened: int, path: str) -> str:
 def parent() -> int:
     """Return the id of the process that forked this one."""
     return os.getppid()
+
+
+def forget() -> None:
+    """Drop the sockets that the program had when it forked the process that forked this one."""
+    vars(sys.modules["__main__"])["held"].clear()
+    gc.collect()

@@ -83,7 +83,7 @@ def start_fork_server(preloaded: Sequence[str]) -> None:
     forking is not safe, the first worker starts a new interpreter, as it does when the fork server
     dies.
     """
-    if sys.platform != "linux" or threading.active_count() > 1:
+    if sys.platform != "linux" or _threads() > 1:
         return
     from multiprocessing import forkserver  # not on Windows
 
@@ -97,17 +97,23 @@ def start_fork_server(preloaded: Sequence[str]) -> None:
         util.spawnv_passfds = started_anew
 
 
+def _threads() -> int:
+    """Return the number of threads of this process, also of those that Python did not start."""
+    try:
+        return len(os.listdir("/proc/self/task"))  # noqa: PTH208 - counted, not visited
+    except OSError:
+        return threading.active_count()
+
+
 def _forked(path: bytes, args: Sequence[Any], passfds: Sequence[int]) -> int:
     """Do in a fork of this process what the interpreter at `path` would do for `-c` among `args`,
-    with no open files but `passfds` and the standard ones. Return the number of the process."""
+    with no files of this process but `passfds` and the standard ones. Return the number of the
+    process."""
     process = os.fork()
     if process:
         return process
     try:
-        end = os.sysconf("SC_OPEN_MAX")
-        kept = sorted(passfds)
-        for before, after in zip([2, *kept], [*kept, end], strict=True):
-            os.closerange(before + 1, after)
+        _let_go_of_files(passfds)
         gc.freeze()  # pages that nobody writes to stay shared
         gc.enable()
         exec(args[-1], {})  # a line that `multiprocessing` writes
@@ -117,6 +123,19 @@ def _forked(path: bytes, args: Sequence[Any], passfds: Sequence[int]) -> int:
         traceback.print_exc()
     finally:
         os._exit(1)
+
+
+def _let_go_of_files(kept: Sequence[int]) -> None:
+    """Put the null device in the place of each open file but the standard ones and those in `kept`.
+
+    A descriptor that is closed is given out again, for example for the wire of a worker; an object
+    that still believes to own it would close that.
+    """
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for name in os.listdir("/proc/self/fd"):  # noqa: PTH208 - numbers, no paths
+        if int(name) > 2 and int(name) not in (*kept, nothing):
+            os.dup2(nothing, int(name), inheritable=False)
+    os.close(nothing)
 
 
 def wire() -> tuple[Connection, Connection]:
