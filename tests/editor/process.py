@@ -72,7 +72,7 @@ class Editor:
 
     def client(self) -> httpx.Client:
         """Return an HTTP client with the token."""
-        return httpx.Client(base_url=self.url, headers=BEARER, trust_env=False, timeout=20)
+        return httpx.Client(base_url=self.url, headers=BEARER, trust_env=False, timeout=60)
 
     def room(self, graph: str, query: str = "") -> str:
         """The address of a graph's room."""
