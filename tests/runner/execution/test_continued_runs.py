@@ -255,6 +255,27 @@ async def test_a_run_is_continued_once() -> None:
 
 
 @virtual
+async def test_of_two_people_who_continue_a_run_at_once_one_is_refused() -> None:
+    refused: list[str] = []
+    async with Harness().runner() as control:
+        start = simulated(sequence("task", 3))
+        first = await stopped_in(control, start, "Work_1")
+        again = on(start, first, Work_1="again")
+
+        async def press(request_id: str) -> None:
+            try:
+                await control.start(msgspec.structs.replace(again, request_id=request_id), ANN)
+            except Conflict as why:
+                refused.append(str(why))
+
+        async with anyio.create_task_group() as people:
+            people.start_soon(press, "Ann's press")
+            people.start_soon(press, "Ben's press")
+        assert len(refused) == 1
+        assert "has continued run" in refused[0]
+
+
+@virtual
 async def test_only_a_led_run_of_this_version_that_is_over_is_continued() -> None:
     async with Harness().runner() as control:
         start = simulated(sequence("task", 3))
@@ -392,7 +413,7 @@ async def test_a_run_is_continued_on_its_own_robots() -> None:
 
 @virtual
 async def test_an_action_that_an_arrow_stops_is_stopped_in_the_continued_run_too() -> None:
-    """What an arrow stopped counts as stopped, never as done."""
+    """An action that an arrow has stopped counts as stopped, never as done."""
     harness = Harness()
     async with harness.runner() as control:
         graph = sequence("task", 3)

@@ -136,6 +136,14 @@ def engines_of(request: StartRequest) -> tuple[str, ...]:
     return tuple(sorted({*named} - {SIMULATOR}))
 
 
+def kept_for(request: StartRequest) -> tuple[str, ...]:
+    """Return what one start at a time may have: its robots, by name, and the run that it continues, if
+    any. No robot's name has a slash."""
+    since = request.start_from
+    continued = (f"run/{since.run}",) if since is not None and since.continues else ()
+    return (*engines_of(request), *continued)
+
+
 class StartChecks:
     """Decides whether a graph may be started on one engine. Nothing is stored, and an engine is
     only asked for its graphs."""

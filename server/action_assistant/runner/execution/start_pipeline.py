@@ -26,7 +26,12 @@ from action_assistant.random_ids import random_id
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.start_checks import AcceptedStart, StartChecks, engines_of
+from action_assistant.runner.execution.start_checks import (
+    AcceptedStart,
+    StartChecks,
+    engines_of,
+    kept_for,
+)
 from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
 from action_assistant.runner.runs.events import Author, Led, Requested
 from action_assistant.runner.runs.run import Run
@@ -86,7 +91,7 @@ class StartPipeline:
             if known is not None:
                 return Started(known, fresh=False)
             await self._checks.require_sight(request, starter)
-            async with self.turns(engines_of(request)):
+            async with self.turns(kept_for(request)):
                 accepted = await self._checks.accept(request, starter)
                 run = await self._store_and_hand_over(accepted, author, starter, stops)
             return Started(run, fresh=True)
@@ -121,13 +126,13 @@ class StartPipeline:
     # --- claim --------------------------------------------------------------------------------
 
     @asynccontextmanager
-    async def turns(self, robots: Iterable[str]) -> AsyncIterator[None]:
-        """Return a context that keeps these robots for one start, or for a change of their
-        registration. It waits until they are free. They are locked in the order of their names, so
-        that two callers never wait for each other."""
+    async def turns(self, keys: Iterable[str]) -> AsyncIterator[None]:
+        """Return a context that keeps these robots (and a run that is continued) for one start, or for a
+        change of a robot's registration. It waits until they are free. They are locked in the order of
+        their names, so that two callers never wait for each other."""
         async with AsyncExitStack() as held:
-            for robot in sorted(robots):
-                await held.enter_async_context(self._turns.setdefault(robot, anyio.Lock()))
+            for key in sorted(keys):
+                await held.enter_async_context(self._turns.setdefault(key, anyio.Lock()))
             yield
 
     def is_under_way(self, request_id: str) -> bool:
