@@ -56,7 +56,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             continue
         waits = item.get_closest_marker("turns") and not doses.has_its_turn(item.nodeid)
         if waits and not files_named:
-            item.add_marker(pytest.mark.skip(reason="has its turn on another day: TEST_DAY"))
+            item.add_marker(
+                pytest.mark.skip(
+                    reason="has its turn on another day: name its file, or set TEST_DAY"
+                )
+            )
 
 
 def skipped(config: pytest.Config) -> Counter[str]:

@@ -57,7 +57,7 @@ function Lines({ title, lines }: { title: string; lines: readonly ReactNode[] })
   const list = (
     <ul>
       {lines.map((line, i) => (
-        // biome-ignore lint/suspicious/noArrayIndexKey: a list is replaced as a whole
+        // biome-ignore lint/suspicious/noArrayIndexKey: lines have no state, and their order never changes
         <li key={i}>{line}</li>
       ))}
     </ul>

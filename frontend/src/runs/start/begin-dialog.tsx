@@ -34,7 +34,7 @@ export function BeginDialog({ graph, name, settle, obstacle, onClose, ...part }:
   const [seq, setSeq] = useState<number | null>(null);
   // The part is pinned when it is asked for: a run that ends meanwhile changes nothing.
   const [{ at, only, run }] = useState(part);
-  // biome-ignore lint/correctness/useExhaustiveDependencies: asked for once
+  // biome-ignore lint/correctness/useExhaustiveDependencies: the version is pinned once, when the dialog opens
   useEffect(() => {
     let gone = false;
     const fail = (why: string) => {
