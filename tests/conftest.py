@@ -16,7 +16,7 @@ from hypothesis import settings
 
 from journal import servers
 from journal.servers import Server
-from support import doses, skips
+from support import doses, skips, warm
 from support.recordings import CORPUS, NO_CORPUS, family
 
 # `make containers` runs these, as root, for a quarter of an hour.
@@ -104,6 +104,12 @@ def no_settings_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """Settings of whoever runs the tests must not change what they test."""
     for name in [name for name in os.environ if name.startswith("ACTION_ASSISTANT_")]:
         monkeypatch.delenv(name)
+
+
+@pytest.fixture
+def new_interpreters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The test is about how processes start: each is a new interpreter, and no fork of a warm one."""
+    monkeypatch.setenv(warm.NEW_INTERPRETERS, "1")
 
 
 @pytest.fixture(scope="session")

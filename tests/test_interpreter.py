@@ -11,6 +11,8 @@ from action_assistant.errors import CannotStart
 from action_assistant.interpreter import for_runner, rclpy_fits
 from support.product import Product, running
 
+pytestmark = pytest.mark.usefixtures("new_interpreters")
+
 HERE = Path(sys.executable)
 
 

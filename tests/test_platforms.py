@@ -20,6 +20,8 @@ from action_assistant.cli import main
 from support import elsewhere
 from support.product import Product, free_ports, running
 
+pytestmark = pytest.mark.usefixtures("new_interpreters")
+
 PACKAGE = Path(__file__).parents[1] / "server" / "action_assistant"
 EXAMPLES = sorted((PACKAGE / "examples").glob("*.json"))
 #: Modules of the standard library that exist on POSIX alone.

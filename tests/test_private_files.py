@@ -19,6 +19,8 @@ from action_assistant.journal.lock import own
 from action_assistant.private_files import holds_nothing_else, open_to_others, own_folder
 from support.product import COMMAND, running
 
+pytestmark = pytest.mark.usefixtures("new_interpreters")
+
 _NOBODY: Final = 65534
 GRAPH = {
     "graph_name": "g",

@@ -17,6 +17,8 @@ from action_assistant.interpreter import Interpreter
 from action_assistant.supervisor import Child, EndSignal, Watchdog
 from support.product import Product, running
 
+pytestmark = pytest.mark.usefixtures("new_interpreters")
+
 
 def eventually(holds: Callable[[], bool], seconds: float = 20) -> None:
     """Wait until something holds."""

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import subprocess
 import time
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
@@ -14,7 +13,8 @@ import httpx_ws
 from pycrdt import Doc, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from support.product import COMMAND, TOKEN, free_ports
+from support import warm
+from support.product import TOKEN, free_ports
 
 BEARER = {"authorization": f"Bearer {TOKEN}"}
 
@@ -27,7 +27,7 @@ class Editor:
         self._database = ["--database", database] if database else []
         self.port = free_ports()
         self.log = data.parent / f"{data.name}.log"
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: warm.Process | None = None
 
     @property
     def url(self) -> str:
@@ -35,16 +35,9 @@ class Editor:
 
     def start(self) -> None:
         """Start it and wait until it answers."""
-        with self.log.open("ab") as log:
-            self._process = subprocess.Popen(
-                [
-                    *(*COMMAND, "editor", "--data", str(self.data), "--port", str(self.port)),
-                    *self._database,
-                ],
-                env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
-                stderr=log,
-                stdout=log,
-            )
+        words = ["editor", "--data", str(self.data), "--port", str(self.port), *self._database]
+        environ = {**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN}
+        self._process = warm.start(words, environ, self.log)
         deadline = time.monotonic() + 120
         while True:
             with contextlib.suppress(httpx.TransportError):

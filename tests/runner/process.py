@@ -4,7 +4,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -14,8 +13,9 @@ import msgspec
 from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.runner.start.admission import StartRequest
+from support import warm
+from support.product import COMMAND, TOKEN
 
-TOKEN = "test-token-" + "0123456789abcdef" * 2
 BEARER = {"authorization": f"Bearer {TOKEN}"}
 
 
@@ -29,7 +29,7 @@ class RunnerProcess:
             free.bind(("127.0.0.1", 0))
             self.port: int = free.getsockname()[1]
         self._log = data.parent / f"{data.name}.log"
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: warm.Process | None = None
 
     @property
     def pid(self) -> int:
@@ -39,18 +39,14 @@ class RunnerProcess:
 
     def start(self, *wrapper: str) -> "RunnerProcess":
         """Start it, through another program if need be, and wait until it is ready."""
-        with self._log.open("ab") as log:
-            self._process = subprocess.Popen(
-                [
-                    *wrapper,
-                    *(sys.executable, "-m", "action_assistant", "runner"),
-                    *("--data", str(self.data), "--port", str(self.port)),
-                    *self._flags,
-                ],
-                env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
-                stdout=log,
-                stderr=log,
-            )
+        words = ["runner", "--data", str(self.data), "--port", str(self.port), *self._flags]
+        environ = {**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN}
+        if wrapper:
+            command = [*wrapper, *COMMAND, *words]
+            with self._log.open("ab") as log:
+                self._process = subprocess.Popen(command, env=environ, stdout=log, stderr=log)
+        else:
+            self._process = warm.start(words, environ, self._log)
         deadline = time.monotonic() + 120
         while not self._ready():
             if time.monotonic() > deadline or self._process.poll() is not None:

@@ -28,6 +28,7 @@ def test_the_runner_loads_neither_the_editor_nor_a_crdt() -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="needs /proc")
+@pytest.mark.usefixtures("new_interpreters")
 def test_a_runner_that_has_worked_has_no_crdt_in_its_memory(own_process: RunnerProcess) -> None:
     with own_process.client() as client:
         run = started(client, order(sequence(), script={"*": [{"after_s": 0.01}]}))

@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import psutil
 
+from support import warm
 from support.command_line import ran
 
 TOKEN = "test-token-" + "0123456789abcdef" * 2
@@ -55,7 +56,7 @@ class Product:
         self._scheme = "https" if "--tls" in flags else "http"
         self.port = free_ports()
         self.log = data.parent / f"{data.name}.log"
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: warm.Process | None = None
 
     @property
     def url(self) -> str:
@@ -79,24 +80,20 @@ class Product:
 
     def start(self) -> None:
         """Start it and wait until both processes answer."""
-        with self.log.open("ab") as log:
-            self._process = subprocess.Popen(
-                [
-                    *self._program,
-                    "serve",
-                    "--data",
-                    str(self.data),
-                    "--port",
-                    str(self.port),
-                    "--no-open",
-                    *self._flags,
-                ],
-                env=self.environment,
-                cwd=self._folder,
-                stderr=log,
-                stdout=log,
-                start_new_session=True,
-            )
+        words = ["serve", "--data", str(self.data), "--port", str(self.port), "--no-open"]
+        words += self._flags
+        if self._program == COMMAND and self._folder is None:
+            self._process = warm.start(words, self.environment, self.log)
+        else:
+            with self.log.open("ab") as log:
+                self._process = subprocess.Popen(
+                    [*self._program, *words],
+                    env=self.environment,
+                    cwd=self._folder,
+                    stderr=log,
+                    stdout=log,
+                    start_new_session=True,
+                )
         self.wait_until_ready()
 
     def wait_until_ready(self, seconds: float = 120) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import httpx
 
+from support import warm
 from support.product import COMMAND, TOKEN, free_ports
 
 BEARER = {"authorization": f"Bearer {TOKEN}"}
@@ -23,23 +24,26 @@ UPGRADE = (
 @contextmanager
 def started(
     name: str, folder: Path, *flags: str, descriptors: int | None = None
-) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
+) -> Iterator[tuple[int, warm.Process]]:
     """Its port, and the process, which may have so many descriptors. Its log is the file `log`."""
     port = free_ports()
     scheme = "https" if "--tls" in flags else "http"
 
-    def limit() -> None:
-        if descriptors is not None:
-            resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
-
-    with (folder / "log").open("ab") as log:
-        running = subprocess.Popen(
-            [*COMMAND, name, "--data", str(folder / "data"), "--port", str(port), *flags],
-            env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
-            preexec_fn=limit,
-            stdout=log,
-            stderr=log,
-        )
+    words = [name, "--data", str(folder / "data"), "--port", str(port), *flags]
+    environ = {**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN}
+    log = folder / "log"
+    if descriptors is None:
+        running = warm.start(words, environ, log)
+    else:
+        limits = (descriptors, descriptors)
+        with log.open("ab") as out:
+            running = subprocess.Popen(
+                [*COMMAND, *words],
+                env=environ,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, limits),
+                stdout=out,
+                stderr=out,
+            )
     try:
         deadline = time.monotonic() + 120
         while True:
@@ -48,7 +52,7 @@ def started(
                 if httpx.get(url, trust_env=False, verify=False).status_code == 200:
                     break
             except httpx.TransportError:
-                assert time.monotonic() < deadline, (folder / "log").read_text()
+                assert time.monotonic() < deadline, log.read_text()
                 time.sleep(0.05)
         yield port, running
     finally:
