@@ -2,6 +2,7 @@
 
 import { existsSync } from "node:fs";
 import { defineConfig, devices } from "@playwright/test";
+import { anotherDay } from "./e2e/turns";
 
 // No test speaks to another machine, whatever robots it registers.
 process.env.ROS_AUTOMATIC_DISCOVERY_RANGE = "LOCALHOST";
@@ -35,32 +36,20 @@ const NAMED = ["lan.spec.ts", "proxy.spec.ts"];
 /** Files of which each day, by UTC, tries one row, unless a file is named: they are far from STOP, starts and
  * stored edits, or try in other ways what others try. `make soak ARGS=browser` tries all. */
 const TURNS = [
-  ["review", "presence", "history", "extract", "help", "arrows"],
+  ["review", "presence", "history", "extract", "help", "arrows", "phone", "people", "home"],
   [
-    "robot-review",
-    "versions",
-    "library",
-    "outline",
-    "identity-provider",
-    "graph-rights",
-    "programs",
+    ...["robot-review", "versions", "library", "outline", "identity-provider", "graph-rights"],
+    ...["programs", "touch", "lan", "first-view", "access"],
   ],
   [
-    ...[
-      "levels",
-      "drafts",
-      "browser-storage",
-      "causes",
-      "yjs-clients",
-      "view-links",
-      "wrong-clock",
-    ],
-    ...["subgraphs", "problem-fixes", "inspector"],
+    ...["levels", "drafts", "browser-storage", "causes", "yjs-clients", "view-links"],
+    ...["wrong-clock", "subgraphs", "problem-fixes", "inspector", "keyboard", "proxy"],
+    ...["led-simulated", "drawing"],
   ],
 ];
-const DAY = Number(process.env.TEST_DAY ?? Math.floor(Date.now() / 86_400_000));
 const takesAll = process.env.TEST_LONG || process.argv.some((word) => word.includes(".spec"));
-const WAITING = TURNS.filter((_, row) => !takesAll && row !== DAY % TURNS.length)
+if (takesAll) process.env.TEST_ALL_TURNS = "1"; // for the processes that run the tests
+const WAITING = TURNS.filter((_, row) => anotherDay(row) !== "")
   .flat()
   .map((name) => `${name}.spec.ts`);
 

@@ -8,6 +8,7 @@ const LINES = 6;
 /** How reasons begin for which CI may skip a test; any other skip fails it. */
 const ACCEPTED = [
   "takes long:", // `make soak ARGS=browser` runs them
+  "has its turn on another day:", // every third; `make soak` runs all
   "takes pictures for the documentation:", // `make pictures`
   "takes pictures to be looked at:", // `make screens`
   "measures;", // `make performance`

@@ -4,6 +4,7 @@ import { expect, type Page, test } from "@playwright/test";
 import { saved, start } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
+import { anotherDay } from "./turns";
 
 test.skip(NO_ROS !== "", NO_ROS);
 test.describe.configure({ mode: "serial" });
@@ -95,6 +96,7 @@ test.afterAll(async () => {
 });
 
 test("two robots run one graph: the page says whose run it shows, and shows the other one", async () => {
+  test.skip(anotherDay(0) !== "", anotherDay(0));
   const { page } = ada;
   const graph = await product.chain(3, 1);
   await begin(graph, "David", "Eve");
@@ -125,6 +127,7 @@ test("two robots run one graph: the page says whose run it shows, and shows the 
 });
 
 test("a run in which nothing moves says what it waits for, and keeps it as its cause", async () => {
+  test.skip(anotherDay(1) !== "", anotherDay(1));
   const { page } = ada;
   const graph = await lacking(1);
   await begin(graph, "David");
@@ -147,6 +150,7 @@ test("a run in which nothing moves says what it waits for, and keeps it as its c
 });
 
 test("a start that the robot holds and never begins is refused, with the reason, and the robot is free", async () => {
+  test.skip(anotherDay(2) !== "", anotherDay(2));
   const { page } = ada;
   const graph = await lacking(0);
   await begin(graph, "Eve");
@@ -198,6 +202,7 @@ test("the answer to a start on two robots gets lost: both runs are found, and no
 });
 
 test("a dry-run does not hide a run that goes on", async () => {
+  test.skip(anotherDay(1) !== "", anotherDay(1));
   const { page } = ada;
   const graph = await product.chain(4, 1);
   await begin(graph, "David");
