@@ -3,6 +3,7 @@ the product: the roles, scopes and rules stand here as people were promised them
 """
 
 import re
+from pathlib import Path
 from typing import Final, Literal, NamedTuple, get_args
 
 Role = Literal["viewer", "editor", "operator", "owner"]
@@ -24,33 +25,13 @@ Kind = Literal[
 ]
 
 RANKS: Final[tuple[Role, ...]] = get_args(Role)
-#: The permission of a route, by the first expression that its process, method and path match.
-NEEDED: Final[tuple[tuple[str, Permission | None], ...]] = (
-    (r"^runner post /api/(|.*/)stop$", "stop"),
-    (r" get /metrics$", "scrape"),
-    (r" /api/(doctor|status|archive)\b", "restore"),
-    (r" post /api/tokens/\{token\}/revoke$", None),  # whoever holds it, too
-    (
-        r" /api/(audit|graph-rules|invitations|notifications|sessions|view-links|releases)\b",
-        "share",
-    ),
-    (r" /api/(revocations|passkeys/ask-again|people/)", "share"),
-    (r" (put|delete) .*/(release|rights)$|/rule$| get /api/members/.*/qr$|/incident$", "share"),
-    (r"^editor (post|patch|delete) /api/(groups|members)\b|^runner put /api/members", "share"),
-    (r" get ", "see"),
-    (r" (post|patch|delete) /api/robots(/\{name\})?$", "register"),
-    (
-        r"^runner (post|put) /api/(preflight|asked_inputs|runs|runs/\{run\}/(modify|pause|resume|go_on|step|wait|breakpoints))$",
-        "simulate",
-    ),
-    (r"^runner \w+ /api/(approvals|groups|robots/.*)", "operate"),
-    (r" /api/runs/\{run\}/(at_rest|hand_over|outcome)$", "operate"),
-    # What is one's own, and what answers without changing anything.
-    (r" /api/(devices|confirmations|logins|mentions/read|passkeys|tokens)\b", "see"),
-    (r"/(extraction|preview|rehearsal|rewriting|since|unpacking|script|check|pieces)$", "see"),
-    (r" /api/expectations/proposal$", "see"),
-    (r"", "edit"),
-)
+#: The permission of each route, by its process, method and path: the rows of `rights_of_routes.txt`.
+NEEDED: Final[dict[str, str]] = {}
+for _line in Path(__file__).with_name("rights_of_routes.txt").read_text("utf-8").splitlines():
+    if _line.startswith("["):
+        _process, _needed = _line.strip("[]").split()
+    elif _line and not _line.startswith("#"):
+        NEEDED[f"{_process} {' '.join(_line.split())}"] = _needed
 #: The least role for a permission, and the scopes of programs that include it.
 LEAST: Final[dict[Permission, tuple[Role, str]]] = {
     "see": ("viewer", "read edit simulate operate"),
@@ -68,7 +49,7 @@ PERSON_ONLY: Final = re.compile(
     r"(get|post) /api/tokens$|/api/logins/(look|confirm|refuse)|/api/devices|post /api/approvals"
     r"|post /api/robots/.*/drills|/api/runs/[^/]+/(at_rest|go_on|step|outcome|breakpoints)"
     r"|/api/tokens/.*/revoke$"
-    r"|/api/confirmations|/api/passkeys|/api/mentions|/api/approvals/asked"
+    r"|/api/confirmations|/api/passkeys|/api/mentions"
 )
 #: What a robot was sent, of which nobody knows whose graph it is: for those who may see every graph.
 OF_UNKNOWN_GRAPHS: Final = re.compile(
