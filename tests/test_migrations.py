@@ -119,6 +119,7 @@ def test_revisions_are_those_of_the_scripts(branch: Branch, tmp_path: Path) -> N
     assert revisions_of(branch) == steps(Empty(branch, f"sqlite:///{tmp_path / 'one.db'}"))
 
 
+@pytest.mark.turns
 @branches
 def test_alembic_is_loaded_only_where_a_script_has_to_run(branch: Branch, tmp_path: Path) -> None:
     def loaded(name: str) -> str:
@@ -155,6 +156,7 @@ def test_alembic_finds_nothing_to_add(empty: Empty, by_scripts: bool) -> None:
     assert empty.do(compare) == []
 
 
+@pytest.mark.turns
 def test_every_step_can_be_taken_back_and_again(empty: Empty) -> None:
     empty.migrate()
     wanted = empty.do(schema)
@@ -173,6 +175,7 @@ def survive(stored: Rows, found: Rows) -> None:
             assert {name: row[name] for name in kept} == {name: old[name] for name in kept}
 
 
+@pytest.mark.turns
 def test_rows_of_every_revision_survive_the_next_step(empty: Empty) -> None:
     stored: Rows = {}
     for revision in steps(empty):

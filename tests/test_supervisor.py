@@ -17,8 +17,6 @@ from action_assistant.interpreter import Interpreter
 from action_assistant.supervisor import Child, EndSignal, Watchdog
 from support.product import Product, running
 
-pytestmark = pytest.mark.usefixtures("new_interpreters")
-
 
 def eventually(holds: Callable[[], bool], seconds: float = 20) -> None:
     """Wait until something holds."""
@@ -28,6 +26,7 @@ def eventually(holds: Callable[[], bool], seconds: float = 20) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.usefixtures("new_interpreters")
 def test_both_processes_answer_and_end_together(tmp_path: Path) -> None:
     with running(tmp_path / "data") as product:
         family = psutil.Process(product.process("editor").ppid()).children()
@@ -111,6 +110,7 @@ def test_silence_is_said_at_once_and_each_minute(name: str, lines: int, said: li
     assert "not answered for 20 s" in said[0]
 
 
+@pytest.mark.usefixtures("new_interpreters")
 def test_children_do_not_outlive_a_killed_serve(tmp_path: Path) -> None:
     product = Product(tmp_path / "data")
     product.start()

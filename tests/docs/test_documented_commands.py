@@ -262,6 +262,7 @@ TRIED: Final = [
 ]
 
 
+@pytest.mark.turns
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("document", TRIED)

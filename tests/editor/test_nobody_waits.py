@@ -220,6 +220,7 @@ async def test_an_update_that_takes_long_is_refused_and_others_go_on(rooms: Room
         assert room.seq == 1
 
 
+@pytest.mark.turns
 @pytest.mark.timeout(300)  # a busy machine asks to come again, each time after 8 s
 async def test_an_update_that_would_hold_the_process_up_is_refused_to_its_sender(
     editor: Editor, http: httpx.Client, graph: str

@@ -76,6 +76,7 @@ def test_any_graph_survives_writing(graph: Graph) -> None:
     examine(text.encode())
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize(
     "data",
     [

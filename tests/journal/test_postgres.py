@@ -210,6 +210,7 @@ async def test_after_a_connection_that_was_aborted_another_one_writes(
         await asyncio.to_thread(session.close)
 
 
+@pytest.mark.turns
 async def test_cuts_anywhere_under_load_lose_nothing_and_double_nothing(postgres: Server) -> None:
     url = postgres.new_database()
     chance = random.Random(13)

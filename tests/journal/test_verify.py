@@ -146,6 +146,7 @@ async def test_a_change_is_found_on_postgres_too(postgres: Server) -> None:
     await journal.close()
 
 
+@pytest.mark.turns
 async def test_each_flipped_byte_of_the_file_is_found_or_changes_no_event(
     tmp_path: Path, in_memory: Path
 ) -> None:

@@ -86,6 +86,7 @@ def lively_graphs(draw: st.DrawFn) -> Graph:
     return replace(graph, actions=actions)
 
 
+@pytest.mark.turns
 @given(st.one_of(busy_graphs(), lively_graphs()), CALLS)
 @settings(max_examples=examples(300), deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_hazard_of_any_simulation_is_reported_by_check(graph: Graph, calls: Calls) -> None:

@@ -105,6 +105,7 @@ def test_package_xml_has_the_description_as_text(text: str) -> None:
     assert xml.findtext("name") == "ta_try"
 
 
+@pytest.mark.turns
 def test_cmake_builds_and_installs_the_library_and_the_description(tmp_path: Path) -> None:
     """The build has stubs for ROS 2 and the engine, which CI does not have."""
     if shutil.which("g++") is None:

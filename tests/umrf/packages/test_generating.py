@@ -22,6 +22,7 @@ GOLDEN = Path(__file__).parent / "golden"
 DESCRIBED = sorted(GOLDEN.glob("*.umrf.json"))
 
 
+@pytest.mark.turns
 @pytest.mark.parametrize("path", DESCRIBED, ids=lambda path: path.name.partition(".")[0])
 def test_packages_are_as_they_were_looked_at(path: Path) -> None:
     """`action-assistant package FILE --output tests/umrf/packages/golden` makes them anew; what it keeps
