@@ -73,6 +73,8 @@ def product(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Ite
         )
         environ.setenv("ACTION_ASSISTANT_NOTIFICATIONS", str(settings))
         environ.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        if HAS_ROBOT:
+            environ.setenv("ACTION_ASSISTANT_RUNNER_PYTHON", str(PYTHON))
         told(environ, provider, limits=True)
         with running(folder / "data") as found:
             yield found

@@ -285,34 +285,47 @@ def test_nothing_that_is_answered_tells_of_a_graph_out_of_sight(
         "/api/actions": {"name": STEP, "from_graphs": True},
         "/api/graphs?preview=true": graph_file("Other", SECRET),
     }
-    told = []
-    with httpx.Client(base_url=product.url, trust_env=False, timeout=30) as http:
-        for deleted in ("false", "true"):
-            text = http.get(f"/api/graphs?deleted={deleted}", headers=nobody.headers).text
-            told += [(f"list {deleted}", each) for each in [*secrets, SECRET] if each in text]
-        for path in ("/api/actions", "/api/actions/graphs", "/api/folders"):
-            text = http.get(path, headers=nobody.headers).text
-            told += [(path, each) for each in secrets if each in text]
-        for method, path, _ in operations(owner):
-            if "{" not in path or method != "get" or path.startswith("/api/sessions"):
-                continue
-            url = url_of(path, open_ids)
-            text = http.get(url, params=queries.get(path), headers=nobody.headers).text
-            asked = {each for each in secrets if each in url}  # echoed
-            told += [(path, each) for each in secrets if each in text and each not in asked]
-        for path, body in bodies.items():
-            text = http.post(url_of(path, open_ids), json=body, headers=nobody.headers).text
-            sent = json.dumps(body)  # echoed
-            told += [(path, each) for each in secrets if each in text and each not in sent]
-        with http.stream("GET", "/api/events?after=0", headers=nobody.headers) as events:
-            text, seen = "", 0
-            for line in events.iter_lines():
-                text += line
-                seen += line.startswith("data:")
-                if json.dumps(things.outer)[1:-1] in line or seen > 500:
-                    break
-            told += [("/api/events", each) for each in secrets if each in text]
-    assert told == []
+    lists = [f"/api/graphs?{query}" for query in ("deleted=false", "deleted=true", "limit=50")]
+    lists += ["/api/graphs/names", "/api/graphs/labels"]
+    listed = {each: [*secrets, SECRET] for each in lists} | dict.fromkeys(
+        ("/api/actions", "/api/actions/graphs", "/api/folders"), secrets
+    )
+
+    def told(headers: dict[str, str], sent: dict[str, Any]) -> list[tuple[str, str]]:
+        """Return which secrets the answers to a person hold, by the path that was asked. `sent`: the
+        bodies of what is posted, by path."""
+        found = []
+        with httpx.Client(
+            base_url=product.url, trust_env=False, timeout=30, headers=headers
+        ) as http:
+            for path, words in listed.items():
+                text = http.get(path).text
+                found += [(path, each) for each in words if each in text]
+            for method, path, _ in operations(owner):
+                if "{" not in path or method != "get" or path.startswith("/api/sessions"):
+                    continue
+                url = url_of(path, open_ids)
+                text = http.get(url, params=queries.get(path)).text
+                asked = {each for each in secrets if each in url}  # echoed
+                found += [(path, each) for each in secrets if each in text and each not in asked]
+            for path, body in sent.items():
+                text = http.post(url_of(path, open_ids), json=body).text
+                own = json.dumps(body)  # echoed
+                found += [(path, each) for each in secrets if each in text and each not in own]
+            with http.stream("GET", "/api/events?after=0") as events:
+                text, seen = "", 0
+                for line in events.iter_lines():
+                    text += line
+                    seen += line.startswith("data:")
+                    if json.dumps(things.outer)[1:-1] in line or seen > 500:
+                        break
+                found += [("/api/events", each) for each in secrets if each in text]
+        return found
+
+    assert told(nobody.headers, bodies) == []
+    seen = {path for path, _ in told({"authorization": f"Bearer {TOKEN}"}, {})}
+    assert {*lists[:1], *lists[2:4], "/api/actions/graphs", "/api/events"} <= seen
+    assert len(seen) > 10  # so there is much that could be told
 
 
 def told_until(product: Product, headers: dict[str, str], last: str) -> str:
