@@ -47,7 +47,9 @@ from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs import photos
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.photos import Photos
 from action_assistant.runner.runs.sight import RunSight
 from action_assistant.runner.start.index_writer import IndexWriter, folder_trouble
 from action_assistant.runner.workers import RunnerWorkers
@@ -105,6 +107,7 @@ async def open_services(
         keep = _keep(settings)
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; workers compute
         recordings = Recordings(_folders(settings)["recordings"], on_disk, prunes=keep.raw is None)
+        services.photos = Photos(settings.data / photos.FOLDER, on_disk)
         archive_store = ArchiveStore(journal, keep.folder, on_disk)
         storage = StoragePaths(_file(settings), keep.folder)
         async with _executing(services, archive_store, recordings, storage) as control:

@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from action_assistant.umrf.checks.actors import check_actors
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.checks.questions import check_questions
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.subgraphs import (
     CERTAIN,
@@ -22,6 +23,7 @@ from action_assistant.umrf.files.codec import ActionReading, Reading
 from action_assistant.umrf.files.origins import placed
 from action_assistant.umrf.files.writing import write
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem, Signature
+from action_assistant.umrf.questions import READY_SIGNATURES
 
 __all__ = [
     "REFUSED",
@@ -52,9 +54,11 @@ def check(
     subject = Subject(graph, facts)
     check_structure(subject)
     flow = check_flow(subject, set(graphs or ()) - set(library or ()))
-    check_values(subject, library, graphs or {})
+    known = library if library is None else {**READY_SIGNATURES, **library}
+    check_values(subject, known, graphs or {})
     inside = check_subgraphs(subject, graphs or {}, library or {}, resolution)
     check_actors(subject, inside, flow)
+    check_questions(subject, inside)
     check_scenarios(subject)
     return sorted(subject.problems, key=rank)
 

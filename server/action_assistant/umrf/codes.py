@@ -175,6 +175,10 @@ CODES: Final[dict[str, Code]] = {
     "values-unreadable": Code("hazard", _WARNING, "an arrow that hands on an output which no robot shows, in a graph of several actors", "a led start refuses the graph, also with the package `zz_keep_values`"),
     "stop-across": Code("hazard", _WARNING, "an arrow that stops an action, in a graph of several actors", "the stop is a message of the runner that leads the robots, and does not come without it"),
     "subgraph-across": Code("hazard", _WARNING, "a sub-graph whose actions several actors perform", "a runner that leads the robots sends a sub-graph to one robot and refuses this one; one graph without graphs inside can be led"),
+    # People who answer, and waits of the runner
+    "question": Code("other", _ERROR, "a question, choice, deadline or time that cannot be asked or waited for", "the start is refused; nobody is asked"),
+    "question-inside": Code("other", _ERROR, "a question or a wait in a sub-graph", "a led start refuses the graph; one graph without graphs inside can be led"),
+    "asks-people": Code("other", _WARNING, "an action that people answer, or for which the runner waits", "one engine cannot be given the graph; the runner leads it, and it plays everywhere else"),
     # The rest
     "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
     "name-class": Code("other", _WARNING, "a name that no C++ class can have", "no action package can have it; a sub-graph may"),
@@ -213,7 +217,7 @@ FINAL: Final[frozenset[str]] = STRUCTURAL | {
 }
 
 #: Warnings for which one engine refuses a graph that several robots or the simulator can play.
-REFUSED_ALONE: Final = frozenset({"actors"})
+REFUSED_ALONE: Final = frozenset({"actors", "asks-people"})
 
 #: The order of possible hazards: the engine dies or blocks, the graph cannot be stopped, it never ends.
 _WORST: Final = ("H4", "H5", "H12", "H8", "H14")

@@ -109,6 +109,39 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * AnswerRequest
+     * @description The answer to a question. `value`: true or false for a confirmation, the text of a choice, a text,
+     *     a number, or the id of a photo that was sent for this question. `cannot`: why there is no answer,
+     *     in place of it. `request_id`: names this press; a repeat of one that has counted changes nothing.
+     *     `watching`: as in `StartRequest`, for the robots that may move next.
+     */
+    AnswerRequest: {
+        /** @default null */
+        value?: boolean | number | string | null;
+        /** @default  */
+        cannot?: string;
+        /** @default  */
+        request_id?: string;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
+     * AnswerShown
+     * @description The answer of a person to the question of a visit. `value`: null if they could not answer, for a
+     *     `reason`; of a photo its id.
+     */
+    AnswerShown: {
+        question: string;
+        by: RunnerApi["Author"];
+        /** Format: date-time */
+        at: string;
+        value?: boolean | number | string;
+        /** @default  */
+        reason?: string;
+    };
+    /**
      * Approval
      * @description A person's yes to exactly the graph with this digest.
      */
@@ -546,6 +579,21 @@ export interface RunnerApi {
         coverage: RunnerApi["ArrowCoverage"];
     };
     /**
+     * ClosedQuestion
+     * @description A question that is not open any more. `by`: who has answered it, and `value` how; `why`: the reason
+     *     if nobody has: it was asked again since 60 s had passed ("lapsed") or the run waited ("held"), its
+     *     deadline passed, the runner was restarted, or it was stopped.
+     */
+    ClosedQuestion: {
+        question: string;
+        action: string;
+        /** Format: date-time */
+        at: string;
+        by?: RunnerApi["Author"];
+        value?: boolean | number | string;
+        why?: "deadline" | "held" | "lapsed" | "restarted" | "stopped";
+    };
+    /**
      * ComparedVisit
      * @description The visit number `visit` (from 1) of an action in both runs; null where a run lacks it.
      *     `levels`: the actions around it, outermost first; `name`: its own; `action`: the name that
@@ -864,6 +912,10 @@ export interface RunnerApi {
         robots?: {
             [key: string]: string;
         };
+        /** @default {} */
+        people?: {
+            [key: string]: string;
+        };
         /**
          * @default stop
          * @enum {string}
@@ -1140,6 +1192,11 @@ export interface RunnerApi {
         };
         sent_digest?: string;
         from?: RunnerApi["StartFromShown"];
+        people?: {
+            [key: string]: string;
+        };
+        questions?: RunnerApi["QuestionShown"][];
+        pauses?: RunnerApi["PauseShown"][];
         cause: string;
         pinned: boolean;
         note: string;
@@ -1379,6 +1436,15 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * PauseShown
+     * @description An action for which the runner waits, until about a moment.
+     */
+    PauseShown: {
+        action: string;
+        /** Format: date-time */
+        until: string;
+    };
+    /**
      * PersonFile
      * @description A person as the file says. `groups`: ids of groups. `until`: seconds since 1970 after which
      *     the person may do nothing but Stop; null for no such end.
@@ -1400,6 +1466,13 @@ export interface RunnerApi {
     PersonRef: {
         id: string;
         name: string;
+    };
+    /**
+     * PhotoStored
+     * @description The id of a photo that was stored, with which a question is answered.
+     */
+    PhotoStored: {
+        photo: string;
     };
     /**
      * PlaceInside
@@ -1516,6 +1589,51 @@ export interface RunnerApi {
         arrow: RunnerApi["OutcomeArrow"];
         /** @default [] */
         subgraphs?: RunnerApi["SentSubgraph"][];
+    };
+    /**
+     * QuestionShown
+     * @description A question to people that is open. `action`: its full name; `aid`: its key in the graph; `visit`: of
+     *     the action, from 1. `text`: the question; `choices`: of a choice; `at_least`, `at_most`: of a number.
+     *     `deadline`: until when somebody has to answer, with `at_deadline` as the outcome then; `lapses_at`: when
+     *     it is asked again, with another id, since a robot may move next. `role`: the actor in the graph, `to`:
+     *     the id of the person or group who may answer, "" for all who may run it; `moves`: the robots that
+     *     may move next, which whoever answers has to be allowed to operate. `again`: the id of the question
+     *     that it repeats.
+     */
+    QuestionShown: {
+        id: string;
+        action: string;
+        visit: number;
+        /** @enum {string} */
+        kind: "choice" | "confirm" | "number" | "photo" | "text";
+        text: string;
+        /** Format: date-time */
+        asked_at: string;
+        aid?: string;
+        /** @default [] */
+        choices?: string[];
+        at_least?: number;
+        at_most?: number;
+        deadline?: string;
+        at_deadline?: "error" | "false" | "stopped";
+        lapses_at?: string;
+        /** @default  */
+        role?: string;
+        /** @default  */
+        to?: string;
+        /** @default [] */
+        moves?: string[];
+        /** @default  */
+        again?: string;
+    };
+    /**
+     * QuestionsShown
+     * @description The questions of a run: those that are open, the newest first of the others, and the waits.
+     */
+    QuestionsShown: {
+        open: RunnerApi["QuestionShown"][];
+        closed: RunnerApi["ClosedQuestion"][];
+        pauses: RunnerApi["PauseShown"][];
     };
     /**
      * RawHour
@@ -2070,6 +2188,11 @@ export interface RunnerApi {
         };
         sent_digest?: string;
         from?: RunnerApi["StartFromShown"];
+        people?: {
+            [key: string]: string;
+        };
+        questions?: RunnerApi["QuestionShown"][];
+        pauses?: RunnerApi["PauseShown"][];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2087,7 +2210,9 @@ export interface RunnerApi {
      *     held at the start; `watching`: those that they said to watch. `hidden`: the
      *     reader may not see its graph, so that little else is given. `values`: those that were given at the
      *     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
-     *     them, which was sent, or of the part that was. `from`: where it began, if not at the entry.
+     *     them, which was sent, or of the part that was. `from`: where it began, if not at the entry. `people`: who answers
+     *     the questions of each actor; `questions`: those that are open; `pauses`: the actions for which the runner
+     *     waits.
      */
     RunSummary: {
         id: string;
@@ -2135,6 +2260,11 @@ export interface RunnerApi {
         };
         sent_digest?: string;
         from?: RunnerApi["StartFromShown"];
+        people?: {
+            [key: string]: string;
+        };
+        questions?: RunnerApi["QuestionShown"][];
+        pauses?: RunnerApi["PauseShown"][];
     };
     /**
      * RunWhole
@@ -2189,6 +2319,11 @@ export interface RunnerApi {
         };
         sent_digest?: string;
         from?: RunnerApi["StartFromShown"];
+        people?: {
+            [key: string]: string;
+        };
+        questions?: RunnerApi["QuestionShown"][];
+        pauses?: RunnerApi["PauseShown"][];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2438,7 +2573,8 @@ export interface RunnerApi {
      *     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
      *     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
      *     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
-     *     of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
+     *     of each actor ("" for actions without one), `people` who answers the questions of each actor: the id
+     *     of a person or of a group, "" for all who may run it; `lost`: see `Led`. `watching`: true for each robot of
      *     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
      *     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
      *     version, as the editor seals them; without it, where there are rules, the run is for its starter
@@ -2469,6 +2605,10 @@ export interface RunnerApi {
         tree_digest?: string | null;
         /** @default {} */
         robots?: {
+            [key: string]: string;
+        };
+        /** @default {} */
+        people?: {
             [key: string]: string;
         };
         /**
@@ -2752,8 +2892,9 @@ export interface RunnerApi {
      *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
      *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
      *     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
-     *     led run, `robot`: the engine that played it; `said`: the person who stated the result,
-     *     where no answer has shown it.
+     *     led run, `robot`: the engine that played it ("people", or "runner" for a wait); `said`: the person who
+     *     stated the result, where no answer has shown it; `answered`: the person who was asked, with the
+     *     answer.
      */
     VisitShown: {
         /** Format: date-time */
@@ -2773,6 +2914,7 @@ export interface RunnerApi {
         outputs?: {
             [key: string]: string;
         };
+        answered?: RunnerApi["AnswerShown"];
     };
     /**
      * WaitRequest
@@ -2784,6 +2926,28 @@ export interface RunnerApi {
         reason?: string;
         /** @default  */
         request_id?: string;
+    };
+    /**
+     * Waiting
+     * @description The open questions of all runs that the reader may see, the oldest first.
+     */
+    Waiting: {
+        questions: RunnerApi["WaitingQuestion"][];
+    };
+    /**
+     * WaitingQuestion
+     * @description An open question of any run. `may`: the reader may answer it; else `why` says why not.
+     */
+    WaitingQuestion: {
+        run: string;
+        number: number;
+        graph: string | null;
+        graph_name: string;
+        simulated: boolean;
+        question: RunnerApi["QuestionShown"];
+        may: boolean;
+        /** @default  */
+        why?: string;
     };
     /**
      * Where
@@ -2879,6 +3043,21 @@ export interface RunnerPaths {
     };
     "/api/runs/{run}/outcome": {
         post: RunnerOperations["giveOutcome"];
+    };
+    "/api/questions": {
+        get: RunnerOperations["waitingQuestions"];
+    };
+    "/api/runs/{run}/questions": {
+        get: RunnerOperations["runQuestions"];
+    };
+    "/api/runs/{run}/questions/{question}/answer": {
+        post: RunnerOperations["answerQuestion"];
+    };
+    "/api/runs/{run}/questions/{question}/photo": {
+        post: RunnerOperations["sendPhoto"];
+    };
+    "/api/runs/{run}/photos/{photo}": {
+        get: RunnerOperations["runPhoto"];
     };
     "/api/labels": {
         get: RunnerOperations["listLabels"];
@@ -3368,6 +3547,84 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    waitingQuestions: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Waiting"];
+                };
+            };
+        };
+    };
+    runQuestions: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QuestionsShown"];
+                };
+            };
+        };
+    };
+    answerQuestion: {
+        parameters: {
+            path: {
+                run: string;
+                question: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["AnswerRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    sendPhoto: {
+        parameters: {
+            path: {
+                run: string;
+                question: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["PhotoStored"];
+                };
+            };
+        };
+    };
+    runPhoto: {
+        parameters: {
+            path: {
+                run: string;
+                photo: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "image/*": string;
                 };
             };
         };

@@ -27,7 +27,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.journal.removal import StreamRemoved
 from action_assistant.private_files import opener
 from action_assistant.runner.archives.raw_messages import RawArchived
-from action_assistant.runner.runs import sight
+from action_assistant.runner.runs import photos, sight
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import posix
@@ -44,7 +44,7 @@ BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
 RECORDINGS: Final = "recordings"
 #: What is taken along beside journals and archives. A folder of these is put back file by file, if
 #: its files never change; the others are put back where there is none.
-MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
+MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS, photos.FOLDER})
 WHOLE: Final = frozenset(
     {
         *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE, sight.FILE),

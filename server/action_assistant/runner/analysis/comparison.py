@@ -19,6 +19,7 @@ from action_assistant.runner.analysis.causes import (
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.counts import visit_counts
+from action_assistant.runner.runs.question_views import answers_by_visit
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.safe_text import hold_names
@@ -244,6 +245,8 @@ def _steps(
         visits_a, visits_b = _visits(left), _visits(right)
         words_a = views.words_for(a.said.get(pair.a or "", ()))
         words_b = views.words_for(b.said.get(pair.b or "", ()))
+        answers_a = answers_by_visit(a.answers.get(pair.a or "", ()))
+        answers_b = answers_by_visit(b.answers.get(pair.b or "", ()))
         for number in sorted(visits_a.keys() | visits_b.keys()):
             one, other = visits_a.get(number), visits_b.get(number)
             yield ComparedVisit(
@@ -252,10 +255,20 @@ def _steps(
                 name=pair.place.name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
-                a=views.visit_view(one, _robot(left), words_a.get(number, msgspec.UNSET))
+                a=views.visit_view(
+                    one,
+                    _robot(left),
+                    words_a.get(number, msgspec.UNSET),
+                    answers_a.get(number, msgspec.UNSET),
+                )
                 if one
                 else None,
-                b=views.visit_view(other, _robot(right), words_b.get(number, msgspec.UNSET))
+                b=views.visit_view(
+                    other,
+                    _robot(right),
+                    words_b.get(number, msgspec.UNSET),
+                    answers_b.get(number, msgspec.UNSET),
+                )
                 if other
                 else None,
                 relation=missed.relation(pair, _relation(one, other)),

@@ -15,6 +15,7 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Observed, PieceSeen
+from action_assistant.runner.runs.question_views import answers_by_visit
 from action_assistant.runner.runs.run import Run
 from action_assistant.version import VERSION
 from action_assistant.web.auth.caller import without_origin
@@ -35,7 +36,7 @@ _COLUMNS: Final = (
     "seconds_most",
     "missed",
 )
-_LED_COLUMNS: Final = ("robot", "said_by")
+_LED_COLUMNS: Final = ("robot", "said_by", "answered_by")
 _ANY: Final = b'{"type":"object"}'
 #: The schema of foxglove.Log, so that Foxglove's panel shows messages of actions and engines.
 _LOG: Final = msgspec.json.encode(
@@ -103,9 +104,11 @@ def intervals(run: Run) -> bytes:
     return text.getvalue().encode()
 
 
-def _led_cells(run: Run, name: str, number: int) -> tuple[str, str]:
+def _led_cells(run: Run, name: str, number: int) -> tuple[str, str, str]:
     said = views.words_for(run.said.get(name, ())).get(number)
-    return _cell(run.actions[name].robot), "" if said is None else _cell(said.by.name)
+    answer = answers_by_visit(run.answers.get(name, ())).get(number)
+    people = ("" if each is None else _cell(each.by.name) for each in (said, answer))
+    return (_cell(run.actions[name].robot), next(people), next(people))
 
 
 def _missed(count: VisitCount) -> str:
@@ -187,7 +190,10 @@ class _Track:
             for number, visit in enumerate(action.visits, action.older + 1):
                 if visit.until is not None and visit not in known:
                     said = views.words_for(after.said.get(name, ())).get(number, msgspec.UNSET)
-                    shown = msgspec.to_builtins(views.visit_view(visit, action.robot, said))
+                    answers = answers_by_visit(after.answers.get(name, ()))
+                    answered = answers.get(number, msgspec.UNSET)
+                    view = views.visit_view(visit, action.robot, said, answered)
+                    shown = msgspec.to_builtins(view)
                     counts = counts or visit_counts(after)
                     missed = counts[name].at_least
                     body = {"visit": number, **shown, "took": of_visit(visit), "at_least": missed}

@@ -20,6 +20,7 @@ from action_assistant.runner.analysis.keyframes import (
 )
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author, RunEvent
+from action_assistant.runner.runs.question_views import AnswerShown, answers_by_visit
 from action_assistant.runner.runs.run import Desired, Result, Run, State
 from action_assistant.runner.runs.visits import ActionRun
 
@@ -176,7 +177,12 @@ def _head(before: Run | None, after: Run) -> ReplayHead | msgspec.UnsetType:
 def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
     old = before.actions if before is not None else {}
     return {
-        name: _changed(old.get(name), action, views.words_for(after.said.get(name, ())))
+        name: _changed(
+            old.get(name),
+            action,
+            views.words_for(after.said.get(name, ())),
+            answers_by_visit(after.answers.get(name, ())),
+        )
         for name, action in after.actions.items()
         if _looks_new(old.get(name), action)
     }
@@ -196,10 +202,14 @@ def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
 
 
 def _changed(
-    before: ActionRun | None, after: ActionRun, words: Mapping[int, views.SaidShown]
+    before: ActionRun | None,
+    after: ActionRun,
+    words: Mapping[int, views.SaidShown],
+    answers: Mapping[int, AnswerShown],
 ) -> ActionFrame:
     """Return the change of an action between two states of it; None as `before` if it was not
-    there. `words`: the results that persons stated, by number of the visit. Only its last visits
+    there. `words`: the results that persons stated, `answers`: those of people who were asked, by number
+    of the visit. Only its last visits
     can have changed, so the first different one is searched from the end."""
     total = after.older + len(after.visits)
     known = before.older + len(before.visits) if before is not None else 0
@@ -220,7 +230,12 @@ def _changed(
         state=after.state,
         first=first,
         visits=[
-            views.visit_view(each, after.robot, words.get(number, msgspec.UNSET))
+            views.visit_view(
+                each,
+                after.robot,
+                words.get(number, msgspec.UNSET),
+                answers.get(number, msgspec.UNSET),
+            )
             for number, each in enumerate(after.visits[first - after.older :], first + 1)
         ],
         messages=[views.MessageShown(views.time(each.at), each.text) for each in fresh],

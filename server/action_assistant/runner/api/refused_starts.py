@@ -16,7 +16,7 @@ from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.auth.access import Needs, PersonOnly, person_of
 from action_assistant.web.auth.roles import Permission
 
-_What: TypeAlias = Literal["start", "change", "go_on"]
+_What: TypeAlias = Literal["start", "change", "go_on", "answer"]
 _SHOWN: Final = 500  # characters of a reason
 _LONGEST: Final = 100  # of an id or a name
 _MOST: Final = 20  # robots

@@ -38,6 +38,7 @@ FILTERED: Final = frozenset(
     {
         *(
             "/api/runs",
+            "/api/questions",
             "/api/groups",
             "/api/preflight",
             "/api/asked_inputs",

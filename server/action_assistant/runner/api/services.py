@@ -14,6 +14,7 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
+from action_assistant.runner.runs.photos import Photos
 from action_assistant.runner.runs.sent_graphs import Sent
 from action_assistant.runner.runs.sight import NO_RULES, RunSight
 from action_assistant.runner.start.index_writer import IndexWriter
@@ -47,6 +48,7 @@ class RunnerServices:
     identity_now: IdentityNow
     released: ReleasedVersions
     notifications: Notifications
+    photos: Photos
     sight: RunSight
 
     def __init__(self) -> None:

@@ -104,7 +104,9 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     so far; `sent`: the highest number of a piece; `pieces`: by the number of each call without an
     outcome, the piece and the seq of its last event; `again`: pieces that moved again after their
     outcome, each with that seq; `calls`: all calls so far, with the full names of their actions; `breakpoints`:
-    those that count; `played`: the calls among them that the simulator plays; `states`: of the actions;
+    those that count; `played`: the calls among them that the simulator plays; `asked`: those without an
+    outcome of which people were asked, or for which the runner waits, `pauses` until when (µs UTC);
+    `states`: of the actions;
     `unproven`: the last
     piece that ended without a proof of rest by an answer, None if there is none."""
 
@@ -118,6 +120,8 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     calls: dict[int, str] = {}
     played: dict[int, str] = {}
     breakpoints: tuple[Breakpoint, ...] = ()
+    asked: dict[int, str] = {}
+    pauses: dict[int, int] = {}
 
 
 class Step:

@@ -4,7 +4,7 @@ The engine of the whole graph (`LeadingEngine`) says which action begins and whi
 moves nothing. For each action that begins, the conductor sends a piece, a graph of that action
 alone, to the robot that plays it. A piece is a run like any other (`OpenRun`), with its own stream,
 monitor, Stop and proof. Its states tell the outcome, which goes back to the engine. Actions that no
-robot plays pass the same gate, and then the simulator plays them (`PlayedSteps`).
+robot plays pass the same gate; then the simulator plays them, or people are asked (`OwnSteps`).
 
 The run sees the conductor as its link: it is started, stopped and asked like an engine. A graph that
 has ended is shown as such only when no piece is open, so that the proof of rest of the run is made of
@@ -26,6 +26,7 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.kit.clock import ClockUs
+from action_assistant.runner.execution.asked_steps import AskedSteps
 from action_assistant.runner.execution.conducted_steps import (
     GRAPH,
     RUNNER,
@@ -45,6 +46,7 @@ from action_assistant.runner.execution.leading_engine import LeadingEngine
 from action_assistant.runner.execution.led_gate import LedGate
 from action_assistant.runner.execution.led_look import Cleared, LedLook, NotAllowed
 from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.own_steps import OwnSteps
 from action_assistant.runner.execution.piece_values import PieceValues, returned_of
 from action_assistant.runner.execution.played_steps import PlayedSteps
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
@@ -80,6 +82,7 @@ from action_assistant.runner.runs.events import (
     AlarmRaised,
     Author,
     PieceBegan,
+    PieceEnded,
     Requested,
     RunEvent,
 )
@@ -87,13 +90,13 @@ from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText
+from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.identity import Identity
 
 log: Final = logging.getLogger(__name__)
 
 _STORED_S: Final = 5  # for which a piece waits for the journal; later it needs a person
-_STOOD_STILL_S: Final = 0.1
 _UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
 _FOREIGN: Final = frozenset(
     {f"foreign_{what}" for what in ("start", "stop", "pause", "modify", "other")}
@@ -148,6 +151,8 @@ class Conductor:
             left=left,
         )
         self._played = PlayedSteps(first, self.gate, self._engine, self._tell, clock_us, left)
+        shown = self._show_begun
+        self.asked = AskedSteps(first, self.gate, shown, self._tell, clock_us, left)
         self._leading: Leading | None = None
         self._steps: dict[int, Step] = {}
         self._turns = {name: anyio.Lock() for name in self._led.robots.values()}
@@ -159,13 +164,24 @@ class Conductor:
         self._state = "UNINITIALIZED"  # of the graph, as it was reported
         #: The states of the actions that robots play.
         self._states = dict[str, str]()
-        self._others = dict[str, str]()  # the states of the other actions, as they were reported
+        self._others = dict[str, str]()  # those of the other actions, as they were reported
         for name, state in left.states.items() if left is not None else ():
             (self._states if name in self._led.players else self._others)[name] = state
         self._unproven = left.unproven if left is not None else None  # rests by what was seen
         self._stopped_by = GRAPH
         self._again: dict[str, OpenRun] = {}  # pieces that had ended and move again
         self._stalls = StallWatch(clock_us)
+        self._own = OwnSteps(
+            self.gate,
+            self._played,
+            self.asked,
+            self._stalls,
+            self._has_stored_causes,
+            lambda step: self._steps.pop(step.call.number, None),
+            self._pass_on,
+            lambda step: self._finish(step, "on_stopped", "unsent"),
+            clock_us,
+        )
         self._silences: dict[str, Answer | None] = {}  # told, with the robot's last answer before
         self._unstored: set[RunRecorder] = set()  # of pieces that have ended
         self._rests = RestNews(lambda event: self._run.tell(event), clock_us)
@@ -204,6 +220,7 @@ class Conductor:
         self.gate.close()
         for step in self._steps.values():
             step.end()
+        self.asked.stop()
         for piece in (*(step.piece for step in self._steps.values()), *self._again.values()):
             if piece and piece.run.end is None and (is_press or piece.run.desired != "stopped"):
                 piece.stop(author, "")
@@ -273,7 +290,9 @@ class Conductor:
     def _hear(self, report: Report) -> None:
         match report:
             case CallBegan(call=call) if call.number not in self._steps:
-                robot = self._led.players.get(call.node, SIMULATOR)
+                asked = self.asked.actions.get(call.node)
+                other = SIMULATOR if asked is None else asked.by
+                robot = self._led.players.get(call.node, other)
                 step = self._steps[call.number] = Step(call, robot)
                 if self._tasks is not None:
                     self._tasks.start_soon(self._lead, step)
@@ -342,8 +361,8 @@ class Conductor:
         that the simulator plays is led until it begins."""
         self._take_up_piece(step)
         try:
-            if step.engine == SIMULATOR:
-                await self._lead_played(step)
+            if step.node not in self._led.players:
+                await self._own.lead(step)
                 return
             async with anyio.Lock() if self._led.together else self._turns[step.engine]:
                 await self._lead_in_turn(step)
@@ -353,23 +372,14 @@ class Conductor:
         step.is_led = False
         self._show_what_may_be(self._first.run)
 
-    async def _lead_played(self, step: Step) -> None:
-        """Let the simulator play a step once the gate is open."""
-        while not step.is_stopped:
-            with step.waiting():
-                await self.gate.admit(step)
-                if not await self._has_stored_causes(step):
-                    continue
-                if self._stalls.stands_still:  # noticed soon, and the run is held then
-                    await anyio.sleep(_STOOD_STILL_S)
-                    continue
-                self.gate.halt_before(step)
-                if self.gate.lets(step) and not step.is_stopped:
-                    self._steps.pop(step.call.number, None)
-                    with anyio.CancelScope(shield=True):
-                        await self._played.begin(step)
-                    return
-        await self._finish(step, "on_stopped", "unsent")
+    def _show_begun(self, step: Step) -> None:
+        """Show people that a step which people answer, or for which the runner waits, has begun."""
+        if self._played.note_asked(step):
+            self._others[step.node] = "RUNNING"
+            inputs = {name: as_json(value) for name, value in step.call.inputs.items()}
+            at, first = self._clock_us(), self._first
+            began = NodeState(at, first.graph_name, step.node, "RUNNING", inputs)
+            self._subscribers.tell(Transitions(run=first.run, changes=(began,)))
 
     async def _lead_in_turn(self, step: Step) -> None:
         while True:
@@ -481,6 +491,8 @@ class Conductor:
         if self.gate.is_open and (why := self.gate.why_not_allowed(step.engine)):
             self.gate.hold_run(why)
         self.gate.halt_before(step)
+        if self.gate.is_open and (why := self.asked.why_too_old(step.engine)):
+            self.gate.hold_run(why)
         if not self.gate.lets(step) or step.is_stopped:
             step.was_held_back = True
             raise NotSent("the run was held or stopped before it left")
@@ -590,15 +602,18 @@ class Conductor:
     ) -> None:
         """Record the outcome of a step, and pass it to the engine. `how`: it was told by states of
         the robot ("shape"), by a person ("word"), or no piece was sent ("unsent")."""
+        told = self._values.ended(step, outcome, how, self._clock_us())
+        await self._pass_on(step, told)
+
+    async def _pass_on(self, step: Step, told: PieceEnded) -> None:
         self._steps.pop(step.call.number, None)
         self.gate.passed(step)
-        ended = self._values.ended(step, outcome, how, self._clock_us())
-        step.tell_end(self._run.tell, ended)
-        if lacking := self._values.lacking(ended):
+        step.tell_end(self._run.tell, told)
+        if lacking := self._values.lacking(told):
             self._alarm("led_unset", f"{step.node} on {step.engine} {lacking}")
-        returned = returned_of(ended)
-        self.gate.halt_after(step, outcome, returned.outputs)
-        if self.gate.is_final and outcome == "on_stopped":
+        returned = returned_of(told)
+        self.gate.halt_after(step, told.outcome, returned.outputs)
+        if self.gate.is_final and told.outcome == "on_stopped":
             # Else the engine could take the end of its last action for the end of the graph.
             await self._engine.stop_first(self._first.graph_name)
         await self._engine.returned(returned)
@@ -645,7 +660,7 @@ class Conductor:
         no engine leads the run, and as `LedGate.go_on` does."""
         self._engine.require()
         names = {step.engine for step in self._steps.values() if not step.over.is_set()}
-        names.discard(SIMULATOR)
+        names &= self.gate.robots
         names |= {piece.run.engine for piece in self._again.values() if piece.run.end is None}
         await self.gate.go_on(press, names)
         for step in self._steps.values():

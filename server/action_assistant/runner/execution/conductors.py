@@ -10,6 +10,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import Conflict, OutcomeUnknown
+from action_assistant.runner.execution.asked_steps import Given, OpenQuestion
 from action_assistant.runner.execution.conducted_steps import (
     GoOn,
     Leading,
@@ -35,6 +36,7 @@ from action_assistant.runner.runs.events import (
     Silent,
 )
 from action_assistant.runner.runs.history import LeftRun, RunHistory, piece_number
+from action_assistant.runner.runs.question_events import QuestionClosed
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.idempotency import IdempotentStarts
@@ -122,6 +124,12 @@ class Conductors:
         left = await _left_open(self._history, first, run)
         texts = await self._runtime.run_in_worker(piece_texts, first.umrf, first.subgraphs)
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
+        at = self._runtime.clock_us()
+        for each in run.questions.values():
+            closed = QuestionClosed(
+                at=at, call=each.call, node=each.node, question=each.question, why="restarted"
+            )
+            opened.tell(closed)
         if run.desired != "stopped":
             before = run.held.why.removeprefix(f"{_RESTARTED} {_BEFORE}") if run.held else ""
             why = (
@@ -214,6 +222,40 @@ class Conductors:
             if robot in conductor.gate.robots:
                 conductor.gate.rights_changed(robot)
 
+    def question(self, run: str, question: str) -> OpenQuestion | None:
+        """Return an open question of a run; None if it is not open."""
+        conductor = self._open.get(run)
+        return None if conductor is None else conductor.asked.find(question)
+
+    async def answer(self, run: str, asked: OpenQuestion, given: Given) -> None:
+        """Take the answer of a person in the step of this call, then wait until it is stored. Raise
+        WrongAnswer or Conflict as `AskedSteps.answer` does, OutcomeUnknown if it is not stored within
+        5 s."""
+        self._conductor(run).asked.answer(asked, given)
+        await self.answers_stored(run)
+
+    async def answers_stored(self, run: str) -> None:
+        """Wait until all that was answered in an open run so far is stored. Raise OutcomeUnknown if it is
+        not within 5 s."""
+        opened = self._runs.by_id.get(run)
+        try:
+            with anyio.fail_after(_STORED_S):
+                if opened is not None:
+                    await opened.recorder.flushed()
+        except TimeoutError:
+            text = "The answer could not be stored yet, and is tried further."
+            raise OutcomeUnknown(text) from None
+
+    def add_photo(self, run: str, asked: OpenQuestion, photo: str) -> None:
+        """Keep a photo for a question, as `AskedSteps.add_photo` does."""
+        self._conductor(run).asked.add_photo(asked, photo)
+
+    def refuse_answer(self, run: str, question: str, node: str, by: Author, why: str) -> None:
+        """Record that an answer to a question of a run came too late, if the run is led now."""
+        conductor = self._open.get(run)
+        if conductor is not None and run in self._runs.by_id:
+            conductor.asked.refuse(question, node, by, why)
+
     async def give_word(self, run: str, node: str, word: Word) -> None:
         """Take the outcome of an action (`node`: its full name) of the run with the id `run`, as a
         person states it in `word`, and store it. Raise Conflict if no outcome is asked for,
@@ -282,6 +324,8 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
         calls=course.calls,
         played=course.played,
         breakpoints=now.breakpoints,
+        asked=course.asked,
+        pauses=course.pauses,
     )
 
 

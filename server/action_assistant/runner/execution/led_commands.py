@@ -3,7 +3,7 @@
 Whatever lets an action begin is a start: it is checked like one, and counts at most once.
 """
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from functools import partial
 from typing import Final
 
@@ -75,9 +75,26 @@ class LedCommands:
     ) -> None:
         """Raise Forbidden or Conflict unless the author may start on each robot of a run. `claim`: as
         for `RightsRegistry.refusals`."""
+        self.require_robots(run.robots, author, identity, claim)
+
+    def require_robots(
+        self,
+        robots: Iterable[str],
+        author: Author,
+        identity: Identity | None,
+        claim: Claim | None = None,
+    ) -> None:
+        """Raise Forbidden or Conflict unless the author may start on each of these robots. `claim`: as
+        for `RightsRegistry.refusals`."""
         by = identity or operator_of(author)
         self._rights.act(by)
-        self._rights.require(run.robots, by, claim)
+        self._rights.require(robots, by, claim)
+
+    def why_refused(self, robots: Iterable[str], identity: Identity) -> str:
+        """Return why a person may not start on one of these robots now; "" if they may. This is no sign
+        that they are there."""
+        refused = (self._rights.refusals(name, identity) for name in robots)
+        return next((each[0].text for each in refused if each), "")
 
     async def go_on(
         self, run: str, asked: GoOnRequest, author: Author, identity: Identity | None = None
@@ -110,7 +127,7 @@ class LedCommands:
         run. Its actions that are under way go on. Raise NotFound if there is no such run, Conflict if
         it is over, being stopped or not led, OutcomeUnknown if it is not stored within 5 s."""
         async with self._conductors.once(run, asked.request_id):
-            found = await self._repeated(run, asked.request_id, wait_press(author))
+            found = await self.repeated(run, asked.request_id, wait_press(author))
             if found is not None:
                 return found
             opened = no_piece(await self._movable(run))
@@ -156,10 +173,10 @@ class LedCommands:
         limit: StepLimit,
     ) -> Run:
         async with self._conductors.once(run, asked.request_id):
-            found = await self._repeated(run, asked.request_id, press)
+            found = await self.repeated(run, asked.request_id, press)
             return found or await self._go_on(run, asked, author, identity, limit)
 
-    async def _repeated(self, run: str, request_id: str, press: Press) -> Run | None:
+    async def repeated(self, run: str, request_id: str, press: Press) -> Run | None:
         """Return the run as it is now if a press with this request id has counted in it; None if none
         has. Raise NotFound if there is no such run, Conflict if the request id belongs to another
         press."""
@@ -239,7 +256,7 @@ class LedCommands:
             request_id=asked.request_id,
         )
         async with self._conductors.once(run, asked.request_id):
-            found = await self._repeated(run, asked.request_id, press)
+            found = await self.repeated(run, asked.request_id, press)
             if found is not None:
                 return found
             opened = await self._movable(run)

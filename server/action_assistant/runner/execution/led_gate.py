@@ -83,6 +83,8 @@ class LedGate(Gate):
             self._calls.setdefault(node, set()).add(number)
         self._reached: set[tuple[str, int]] = set()  # breakpoints before calls that were reached
         self._due: list[str] = []  # breakpoints that were reached during trouble
+        #: Called in the step in which the run is held.
+        self.on_hold: Callable[[], None] = _ignore
 
     def hold_run(
         self, why: str, by: Author | None = None, *, how: HeldHow = "trouble", node: str = ""
@@ -105,6 +107,7 @@ class LedGate(Gate):
         if self.is_final or is_known:
             return
         self.hold(held)
+        self.on_hold()
         self._let, self._let_by, self._until = None, None, ""
         self._tell(held, author)
         for step in self._ready.values():
@@ -154,7 +157,7 @@ class LedGate(Gate):
                 or (each.action, call.number) in self._reached
             ):
                 continue
-            if each.holds(self._visit(call), call.inputs):
+            if each.holds(self.visit(call), call.inputs):
                 self._reached.add((each.action, call.number))
                 self.hold_run(f"Breakpoint {each.words()}.", how="breakpoint", node=step.node)
 
@@ -164,7 +167,8 @@ class LedGate(Gate):
         for number, node in left.calls.items():
             self._calls.setdefault(node, set()).add(number)
 
-    def _visit(self, call: Call) -> int:
+    def visit(self, call: Call) -> int:
+        """Return the number of a call among those of its action, from 1."""
         return sum(number <= call.number for number in self._calls.get(call.node, ()))
 
     def halt_after(self, step: Step, outcome: Precondition, outputs: Mapping[str, Any]) -> None:
@@ -173,7 +177,7 @@ class LedGate(Gate):
         told = outcome.removeprefix("on_")
         for each in self.breakpoints:
             is_here = each.is_at_end and each.action == step.node and told in each.outcomes
-            if is_here and each.holds(self._visit(step.call), outputs):
+            if is_here and each.holds(self.visit(step.call), outputs):
                 why = f"Breakpoint {each.words()}."
                 if self.held is not None and self.held.how == "trouble":
                     self._due.append(why)
@@ -268,3 +272,7 @@ class LedGate(Gate):
         due, self._due = self._due, []
         for why in due:  # reached during trouble, and not seen by anybody
             self.hold_run(why, how="breakpoint")
+
+
+def _ignore() -> None:
+    """Do nothing: where nobody has to know that the run is held."""

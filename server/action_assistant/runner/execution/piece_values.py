@@ -88,9 +88,8 @@ class PieceValues:
             return ""
         self._said.add((ended.node, ended.unset))
         names = names_in_words(ended.unset)
-        known = (
-            "has ended without giving" if ended.how == "shape" else "has ended, without a sight of"
-        )
+        is_unseen = ended.how == "word"
+        known = "has ended, without a sight of" if is_unseen else "has ended without giving"
         return f"{known} {names}: nothing is handed on from there."
 
     def _kept(self, step: Step) -> tuple[KeptOutput, ...]:
@@ -117,10 +116,12 @@ class PieceValues:
 
 
 def returned_of(ended: PieceEnded) -> Returned:
-    """Return the end of a call in the form in which the engine of the whole graph takes it."""
+    """Return the end of a call in the form in which the engine of the whole graph takes it: what it
+    stopped it calls stopped by itself."""
+    is_of_engine = ended.outcome == "on_stopped" and ended.how != "deadline"
     return Returned(
         number=ended.call,
-        result="on_true" if ended.outcome == "on_stopped" else ended.outcome,
+        result="on_true" if is_of_engine else ended.outcome,
         outputs={name: msgspec.json.decode(text) for name, text in ended.outputs.items()},
         unset=ended.unset,
     )

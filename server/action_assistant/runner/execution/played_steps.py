@@ -44,7 +44,7 @@ class PlayedSteps:
         self._shown: dict[str, Step] = {}  # the newest that has begun, by full name of its action
         #: The calls that an earlier process let begin.
         self._before = frozenset(left.played) if left is not None else frozenset[int]()
-        for number, node in left.played.items() if left is not None else ():
+        for number, node in (left.played | left.asked).items() if left is not None else ():
             self._going[number] = self._shown[node] = _step_of(number, node, self._graph)
 
     async def begin(self, step: Step) -> None:
@@ -53,6 +53,17 @@ class PlayedSteps:
         self._tell(PlayBegan(at=self._clock_us(), call=step.call.number, node=step.node))
         await self._engine.play(step.call)
         self._gate.passed(step)
+
+    def note_asked(self, step: Step) -> bool:
+        """Remember that a step which people answer, or for which the runner waits, has begun. Return
+        whether that is news."""
+        is_new = step.call.number not in self._going
+        self._going[step.call.number] = self._shown[step.node] = step
+        return is_new
+
+    def end_asked(self, step: Step) -> None:
+        """Remember that a step which people answer, or for which the runner waits, has its outcome."""
+        self._going.pop(step.call.number, None)
 
     def end(self, played: CallPlayed) -> None:
         """Hold the run at the breakpoints after a step that has ended, before anything follows."""

@@ -27,6 +27,7 @@ from action_assistant.runner.execution.led_commands import (
 )
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.question_commands import QuestionCommands
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.start_checks import NO_SOURCES, StartChecks, StartSources
 from action_assistant.runner.execution.start_pipeline import Grouped, Started, StartPipeline
@@ -142,6 +143,12 @@ class ExecutionService:
             find=self.find,
             requested=self.history.requested,
             in_worker=runtime.run_in_worker,
+        )
+        self.questions: Final = QuestionCommands(
+            self._conductors,
+            self._led,
+            find=self.find,
+            open_runs=lambda: [each.run for each in self.open.values()],
         )
         self.set_breakpoints: Final = self._led.set_breakpoints
         self.go_on: Final = self._led.go_on

@@ -132,7 +132,8 @@ class LedStart(msgspec.Struct, frozen=True, kw_only=True):
 
 def engines_of(request: StartRequest) -> tuple[str, ...]:
     """Return the names of the robots that a start is for, sorted; none for the simulator."""
-    named = request.robots.values() if request.robots else (request.engine,)
+    is_led = bool(request.robots or request.people)
+    named = request.robots.values() if is_led else (request.engine,)
     return tuple(sorted({*named} - {SIMULATOR}))
 
 
@@ -211,6 +212,8 @@ class StartChecks:
         earlier = await self._earlier.read(request, starter)
         if request.robots:
             raise BadInput("Only a led run has several robots.", where={"path": "/robots"})
+        if request.people:
+            raise BadInput("Only a led run asks people.", where={"path": "/people"})
         watched_in(request.watching, engines_of(request))
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request, earlier)
@@ -267,13 +270,14 @@ class StartChecks:
         watched_in(request.watching, engines_of(request))
         prepare = partial(prepared_pieces, earlier=await self._earlier.read(request, starter))
         ready = await self._run_in_worker(prepare, request, CONDUCTED_FACTS, random_id())
-        request = msgspec.structs.replace(request, robots=ready.robots)
+        request = msgspec.structs.replace(request, robots=ready.robots, people=ready.people)
         items = (*beginning_items(ready.whole, request.start_from), *led_items(ready))
         overridden = overridden_in(request)
         order = order_of(request, ready.whole.tree_digest, overridden)
         preflight.require_clear(items, overridden)
         parts = [
-            msgspec.structs.replace(request, engine=name, robots={}) for name in engines_of(request)
+            msgspec.structs.replace(request, engine=name, robots={}, people={})
+            for name in engines_of(request)
         ]
 
         async def accept(part: StartRequest) -> AcceptedStart:
@@ -505,7 +509,7 @@ class StartChecks:
             item = preflight.refusal_item(_code_of(refused), refused)
             return [preflight.with_verdict(CONDUCTED, [item])]
         whole, start = ready.whole, request.start_from
-        request = msgspec.structs.replace(request, robots=ready.robots)
+        request = msgspec.structs.replace(request, robots=ready.robots, people=ready.people)
         marks = preflight.breakpoint_items(request.breakpoints, is_led=True)
         begins = beginning_items(whole, start)
         items = [preflight.graph_item(whole), *begins, *led_items(ready), *marks]

@@ -276,4 +276,6 @@ def _led_of(accepted: AcceptedStart) -> Led | None:
         keeping=accepted.led.keeping,
         lost=request.lost,
         together="two-at-once" in accepted.overridden,
+        people=request.people,
+        asked=accepted.led.pieces.asked,
     )

@@ -30,6 +30,7 @@ from action_assistant.runner.runs.events import (
     decode,
 )
 from action_assistant.runner.runs.history import RunHistory
+from action_assistant.runner.runs.question_events import PauseBegan, QuestionAsked
 from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.kept_values import kept_outputs, value_arrows
@@ -46,6 +47,8 @@ class StoredCourse(msgspec.Struct, frozen=True, kw_only=True):
     """The course of a led run. `began`: when its graph was started, µs UTC; `steps`: with their ms after
     that; `calls`: all calls, and `played`: those that the simulator plays, with the full names of their
     actions; `ended`: the outcomes by call; `newest`: the last noted piece of each call without one;
+    `asked`: those without one of which people were asked, or for which the runner waits, and `pauses` until
+    when (µs UTC);
     `noted`: all noted pieces; `by_word`: those whose outcome a person gave, in order."""
 
     began: int
@@ -56,6 +59,8 @@ class StoredCourse(msgspec.Struct, frozen=True, kw_only=True):
     newest: dict[int, str]
     noted: frozenset[str]
     by_word: tuple[str, ...]
+    asked: dict[int, str] = {}
+    pauses: dict[int, int] = {}
 
     @property
     def over(self) -> frozenset[int]:
@@ -76,6 +81,8 @@ async def stored_course(history: RunHistory, first: Requested) -> StoredCourse:
     newest: dict[int, str] = {}
     noted: set[str] = set()
     by_word: list[str] = []
+    asked: dict[int, str] = {}
+    pauses: dict[int, int] = {}
     after = 0
     while events := await history.events(first.run, after, _PAGE):
         after = events[-1].seq
@@ -94,11 +101,17 @@ async def stored_course(history: RunHistory, first: Requested) -> StoredCourse:
                         by_word.append(piece)
                     calls[call] = end.node
                     newest.pop(call, None)
+                    asked.pop(call, None)
                     ended[call] = end
                     steps.append((at, returned_of(end)))
                 case PlayBegan(at=at, call=call, node=node):
                     calls[call] = played[call] = node
                     steps.append((at, Played(call, node)))
+                case QuestionAsked(call=call, node=node):
+                    calls[call] = asked[call] = node
+                case PauseBegan(call=call, node=node, until=until):
+                    calls[call] = asked[call] = node
+                    pauses[call] = until
                 case StopRequested(at=at):
                     steps.append((at, Stopped()))
     own = tuple(((at - began) / 1000, step) for at, step in steps)
@@ -112,6 +125,8 @@ async def stored_course(history: RunHistory, first: Requested) -> StoredCourse:
         newest=newest,
         noted=frozenset(noted),
         by_word=tuple(by_word),
+        asked=asked,
+        pauses=pauses,
     )
 
 

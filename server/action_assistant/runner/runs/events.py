@@ -13,28 +13,25 @@ import msgspec
 from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Seen
+from action_assistant.runner.runs.author import Author as Author
 from action_assistant.runner.runs.earlier import Before, Earlier, StartFrom
+from action_assistant.runner.runs.question_events import (
+    AnswerRefused,
+    PauseBegan,
+    QuestionAnswered,
+    QuestionAsked,
+    QuestionClosed,
+)
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.questions import Asked
 from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.auth.caller import stamped
 from action_assistant.web.auth.graph_seals import Sight
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
-
-
-class Author(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The person behind a command, and the origin of the command. `address`: on the network; "" for
-    the runner's own computer. `by`: "" if it was not recorded. `program`: the name of the token by
-    which a program acted for the person; "" if there is none."""
-
-    id: str
-    name: str
-    by: Literal["browser", "program", ""] = ""
-    address: str = ""
-    program: str = ""
 
 
 class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -71,7 +68,8 @@ class Led(msgspec.Struct, frozen=True, kw_only=True):
     of each engine's process when it was checked before the start. `lost`: what happens when a robot
     does not answer or its step fails: a Stop of everything, or a wait for a person. `together`: a
     person agreed that a robot may carry out two steps at once. `keeping`: the engines that have the
-    helper package by which outputs can be read."""
+    helper package by which outputs can be read. `people`: who answers the questions of each actor;
+    `asked`: the actions that people answer, or for which the runner waits, by full name."""
 
     robots: dict[str, str]
     players: dict[str, str]
@@ -79,6 +77,8 @@ class Led(msgspec.Struct, frozen=True, kw_only=True):
     lost: Literal["stop", "wait"] = "stop"
     together: bool = False
     keeping: tuple[str, ...] = ()
+    people: dict[str, str] = {}
+    asked: dict[str, Asked] = {}
 
 
 class PieceOf(msgspec.Struct, frozen=True, kw_only=True):
@@ -394,10 +394,16 @@ class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
         return self.state in {"proven", "seen", "unsent"}
 
 
+#: How the outcome of a call of a led run is known.
+EndHow: TypeAlias = Literal["shape", "word", "unsent", "answer", "deadline", "time", "fault"]
+
+
 class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A call of a led run has its outcome. `how`: by the states of the piece in an answer
-    that was asked for after its end ("shape"), by a person's statement ("word"), or because nothing
-    of it was ever sent ("unsent"). `hash`: the SHA-256 of that answer. `outputs`: the values that
+    that was asked for after its end ("shape"), by a person's statement ("word"), because nothing
+    of it was ever sent ("unsent"), by the answer of a person who was asked ("answer") or the lack of one
+    at the deadline ("deadline"), at the end of a wait ("time"), or since nobody could be asked
+    ("fault"). `hash`: the SHA-256 of that answer. `outputs`: the values that
     the action gave, as JSON by flat name; `unset`: outputs that it did not set, or that nobody saw
     where a person gave the outcome; both empty where no answer can show them. `request_id`: the id
     of the person's request, "" if it has none."""
@@ -408,7 +414,7 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     call: int
     node: str
     outcome: Precondition
-    how: Literal["shape", "word", "unsent"]
+    how: EndHow
     piece: str = ""
     hash: str = ""
     by: Author | None = None
@@ -524,6 +530,11 @@ RunEvent: TypeAlias = (
     | Held
     | Released
     | HandedOver
+    | QuestionAsked
+    | QuestionAnswered
+    | QuestionClosed
+    | AnswerRefused
+    | PauseBegan
     | Unknown
 )
 
@@ -559,6 +570,11 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         Held,
         Released,
         HandedOver,
+        QuestionAsked,
+        QuestionAnswered,
+        QuestionClosed,
+        AnswerRefused,
+        PauseBegan,
     )
 }
 

@@ -7,7 +7,7 @@ knows a clock, a link or a database.
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain, groupby
 from operator import attrgetter
-from typing import Final, Literal, assert_never
+from typing import Final, Literal, TypeVar, assert_never
 
 from msgspec.structs import replace
 
@@ -27,6 +27,7 @@ from action_assistant.runner.runs.events import (
     Answered,
     BreakpointsSet,
     Ended,
+    EndHow,
     EngineSaid,
     HandedOver,
     Held,
@@ -54,10 +55,17 @@ from action_assistant.runner.runs.events import (
     Unconfirmed,
     Unknown,
 )
+from action_assistant.runner.runs.question_events import (
+    AnswerRefused,
+    PauseBegan,
+    QuestionAnswered,
+    QuestionAsked,
+    QuestionClosed,
+)
+from action_assistant.runner.runs.question_fold import after_question, with_press
 from action_assistant.runner.runs.run import (
     Alarm,
     Intervention,
-    Press,
     Run,
     Said,
     go_on_press,
@@ -85,11 +93,15 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.kept_values import NOTHING_KEPT
 from action_assistant.umrf.laps import Laps, laps
 
+T = TypeVar("T")
+
 _SEEN: Final[Callable[[RunEvent], tuple[Seen, ...]]] = attrgetter("seen")  # of `Observed` events
 #: Microseconds after which a get is given up: an answer was asked for at most so long before it came.
 _ASKED_US: Final = 1_000_000
 #: Fields that a run has from its request, under the same names.
 _AS_REQUESTED: Final = set(Run.__struct_fields__) & set(Requested.__struct_fields__) - {"actions"}
+#: How the outcome of an action is known that no robot carries out.
+_OF_NO_ROBOT: Final[frozenset[EndHow]] = frozenset({"answer", "deadline", "time", "fault"})
 #: The state of an action of which nothing has been seen.
 _UNSEEN: Final = ActionRun()
 
@@ -114,6 +126,8 @@ def begin(event: Requested) -> Run:
     """Return the run after its first event, the accepted start."""
     known = event.laps if event.laps is not None else _laps(event.umrf)
     players = event.led.players if event.led is not None else {}
+    asked = event.led.asked if event.led is not None else {}
+    players = players | {name: each.by for name, each in asked.items()}
     once, joined = frozenset(known.once), frozenset(known.barring_errors)
     return Run(
         **{name: getattr(event, name) for name in _AS_REQUESTED},
@@ -186,7 +200,7 @@ def follow(run: Run, event: RunEvent) -> Run:
             return _piece_seen(run, event)
         case Held(by=by):
             held = replace(run, held=event)
-            return held if by is None else _pressed(held, event.request_id, wait_press(by))
+            return held if by is None else with_press(held, event.request_id, wait_press(by))
         case BreakpointsSet():
             return replace(run, breakpoints=event.breakpoints)
         case PieceWaits():
@@ -194,7 +208,7 @@ def follow(run: Run, event: RunEvent) -> Run:
         case Released(author=by, since=since, step=step, until=until):
             is_limited = bool(step or until)
             press = step_press(by, since, step, until) if is_limited else go_on_press(by, since)
-            return _pressed(replace(run, held=None, lead=by), event.request_id, press)
+            return with_press(replace(run, held=None, lead=by), event.request_id, press)
         case HandedOver():
             return replace(run, lead=event.to)
         case PieceEnded():
@@ -207,6 +221,10 @@ def follow(run: Run, event: RunEvent) -> Run:
             return replace(run, waits=_without(run.waits, call))
         case PieceRest():
             return _piece_rest(run, event)
+        case QuestionAsked() | QuestionAnswered() | QuestionClosed() | AnswerRefused():
+            return after_question(run, event)
+        case PauseBegan(call=call):
+            return replace(run, pauses=run.pauses | {call: event})
         case Requested() | Unknown():
             return run
         case _:
@@ -412,6 +430,8 @@ def _end(run: Run, event: Ended) -> Run:
         unknown_since=run.unknown_since if event.state == "lost" else None,
         held=None,
         waits={},
+        questions={},
+        pauses={},
     )
 
 
@@ -434,8 +454,14 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
         "inferred" if event.how == "word" else "observed",
         {name: shortened(text) for name, text in event.outputs.items()} or None,
     )
-    waits = _without(run.waits, event.call)
-    run = replace(run, actions=run.actions | {event.node: action}, waits=waits)
+    run = replace(
+        run,
+        actions=run.actions | {event.node: action},
+        waits=_without(run.waits, event.call),
+        pauses=_without(run.pauses, event.call),
+    )
+    if event.how in _OF_NO_ROBOT:  # who has answered stands in an event of its own
+        return _with_outputs(run, event)
     if event.by is not None and action.call == event.call and action.visits:
         visit = action.older + len(action.visits)
         word = Said(visit=visit, by=event.by, at=event.at, reason=event.reason)
@@ -443,7 +469,7 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
         run = replace(run, said=run.said | {event.node: words})
     if event.by is not None:
         press = outcome_press(event.by, event.node, event.outcome, event.piece, event.reason)
-        run = _pressed(run, event.request_id, press)
+        run = with_press(run, event.request_id, press)
     known = run.rests.get(event.piece)
     if known is None:
         return run
@@ -452,16 +478,17 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
     return replace(run, rests=run.rests | {event.piece: replace(known, asks=False)})
 
 
-def _pressed(run: Run, request: str, press: Press) -> Run:
-    """Return the run with a person's press remembered under its request id ("" : not remembered);
-    of many only the newest stay."""
-    if not request:
+def _with_outputs(run: Run, event: PieceEnded) -> Run:
+    """Return the led run with the values that people have given in the newest visit of an action."""
+    action = run.actions.get(event.node, _UNSEEN)
+    if not action.visits or not event.outputs:
         return run
-    kept = tuple(run.pressed.items())[1 - KEPT :]
-    return replace(run, pressed=dict(kept) | {request: press})
+    outputs = {name: shortened(text) for name, text in event.outputs.items()}
+    visits = (*action.visits[:-1], replace(action.visits[-1], outputs=outputs))
+    return replace(run, actions=run.actions | {event.node: replace(action, visits=visits)})
 
 
-def _without(waits: dict[int, tuple[str, str]], call: int) -> dict[int, tuple[str, str]]:
+def _without(waits: dict[int, T], call: int) -> dict[int, T]:
     return {number: each for number, each in waits.items() if number != call}
 
 

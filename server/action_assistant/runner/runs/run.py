@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import (
     PieceOf,
     PieceRest,
 )
+from action_assistant.runner.runs.question_events import ClosedWhy, PauseBegan, QuestionAsked
 from action_assistant.runner.runs.visits import ActionRun, Message
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.kept_values import NOTHING_KEPT, KeptValues
@@ -81,6 +82,30 @@ class Said(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
 
 
+class Answer(msgspec.Struct, frozen=True, kw_only=True):
+    """The answer of a person to a question of a visit. `visit`: its number, from 1; `value`: as JSON, ""
+    if the person could not answer, for a `reason`."""
+
+    visit: int
+    question: str
+    by: Author
+    at: int
+    value: str = ""
+    reason: str = ""
+
+
+class Closed(msgspec.Struct, frozen=True, kw_only=True):
+    """A question that can be answered no more. `by`: who has answered it, None if nobody has; `value`:
+    that answer; `why`: else the reason; `at`: since when."""
+
+    question: str
+    node: str
+    at: int
+    by: Author | None = None
+    value: str = ""
+    why: ClosedWhy | None = None
+
+
 class Press(msgspec.Struct, frozen=True):
     """An order of a person to a led run. `by`: the id of the person; `what`: the kind of order
     and its details, as `go_on_press` and `outcome_press` write them; "" stands for any."""
@@ -115,6 +140,11 @@ def outcome_press(by: Author, action: str, outcome: str, piece: str, reason: str
     """Return the press that gives the outcome of an action by word. `piece`: the id of its piece;
     `outcome`: as `Precondition`, such as "on_true"."""
     return Press(by.id, ("outcome", action, outcome, piece, reason))
+
+
+def answer_press(by: Author, question: str, value: str) -> Press:
+    """Return the press that answers a question, by its id. `value`: as JSON, "" for none."""
+    return Press(by.id, ("answer", question, value))
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True):
@@ -157,6 +187,10 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run
+    questions: dict[str, QuestionAsked] = {}  # that are open, by id
+    closed: tuple[Closed, ...] = ()  # the newest questions that are not
+    answers: dict[str, tuple[Answer, ...]] = {}  # the newest, by the action of a led run
+    pauses: dict[int, PauseBegan] = {}  # for which the runner waits now, by call
     #: The newest presses of people on a led run that counted, by their request ids.
     pressed: dict[str, Press] = {}
     desired: Desired = "running"

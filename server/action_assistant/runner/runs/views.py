@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, Final, Literal, TypeAlias, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -23,9 +23,19 @@ from action_assistant.runner.runs.events import (
     HeldHow,
     Overridden,
     Override,
-    PieceRest,
 )
-from action_assistant.runner.runs.run import Desired, Result, Run, Said, State
+from action_assistant.runner.runs.question_views import (
+    AnswerShown,
+    PauseShown,
+    QuestionShown,
+    answers_by_visit,
+    pauses_of,
+    questions_of,
+)
+from action_assistant.runner.runs.rest_views import AT_REST as AT_REST
+from action_assistant.runner.runs.rest_views import RobotRestShown as RobotRestShown
+from action_assistant.runner.runs.rest_views import rests_of as rests_of
+from action_assistant.runner.runs.run import Answer, Desired, Result, Run, Said, State
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.sight import HIDDEN_NAME
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
@@ -75,6 +85,9 @@ _BLANK: Final[dict[str, Any]] = {
     "values": msgspec.UNSET,
     "sent_digest": msgspec.UNSET,
     "start_from": msgspec.UNSET,
+    "people": msgspec.UNSET,
+    "questions": msgspec.UNSET,
+    "pauses": msgspec.UNSET,
     "earlier": None,
     "cause": "",
     "pinned": False,
@@ -92,17 +105,6 @@ _BLANK: Final[dict[str, Any]] = {
     "subgraphs": [],
     "tree_digest": None,
 }
-RestState: TypeAlias = Literal[
-    "unused",
-    "going",
-    "stopping",
-    "silent",
-    "unproven",
-    "proven",
-    "seen",
-    "unsent",
-    "unknown",
-]
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -112,8 +114,9 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
-    led run, `robot`: the engine that played it; `said`: the person who stated the result,
-    where no answer has shown it."""
+    led run, `robot`: the engine that played it ("people", or "runner" for a wait); `said`: the person who
+    stated the result, where no answer has shown it; `answered`: the person who was asked, with the
+    answer."""
 
     start: datetime
     not_before: datetime
@@ -125,6 +128,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     robot: str | msgspec.UnsetType = msgspec.UNSET
     said: "SaidShown | msgspec.UnsetType" = msgspec.UNSET
     outputs: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
+    answered: AnswerShown | msgspec.UnsetType = msgspec.UNSET
 
 
 class SaidShown(msgspec.Struct, frozen=True):
@@ -202,29 +206,6 @@ class HeldShown(msgspec.Struct, frozen=True, omit_defaults=True):
         hold_names(self, "why")
 
 
-class RobotRestShown(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The state of the proof that one robot of a led run is at rest. `state`: nothing of the
-    run was ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is
-    proven ("stopping"), it does not answer ("silent"), no answer can prove rest any more
-    ("unproven"), an answer has proven it ("proven"), a person or the runner has seen it ("seen"),
-    nothing of the last action began ("unsent"), or nothing was recorded of it ("unknown"). `since`:
-    when that began; `action`, `piece`: the action and the run of its piece; `why`: the reason, or
-    how rest was seen; `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest
-    is proven."""
-
-    robot: str
-    state: RestState
-    since: datetime | None = None
-    action: str = ""
-    piece: str = ""
-    why: str = ""
-    by: Author | None = None
-    stops: bool = False
-
-    def __post_init__(self) -> None:
-        hold_names(self, "why")
-
-
 class RunSummary(msgspec.Struct, frozen=True, kw_only=True, rename={"start_from": "from"}):
     """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
@@ -233,7 +214,9 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True, rename={"start_from"
     held at the start; `watching`: those that they said to watch. `hidden`: the
     reader may not see its graph, so that little else is given. `values`: those that were given at the
     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
-    them, which was sent, or of the part that was. `from`: where it began, if not at the entry."""
+    them, which was sent, or of the part that was. `from`: where it began, if not at the entry. `people`: who answers
+    the questions of each actor; `questions`: those that are open; `pauses`: the actions for which the runner
+    waits."""
 
     id: str
     number: int
@@ -271,6 +254,9 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True, rename={"start_from"
     values: StartValues | msgspec.UnsetType = msgspec.UNSET
     sent_digest: str | msgspec.UnsetType = msgspec.UNSET
     start_from: StartFromShown | msgspec.UnsetType = msgspec.UNSET
+    people: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
+    questions: list[QuestionShown] | msgspec.UnsetType = msgspec.UNSET
+    pauses: list[PauseShown] | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -371,12 +357,13 @@ class ActionViewCache:
         """Return the view of the action `name` of a run with at most `most` of its newest visits.
         `count`: how often it ran."""
         action, said = run.actions[name], run.said.get(name, ())
+        answers = run.answers.get(name, ())
         asks = any(each.node == name and each.asks for each in run.rests.values())
-        rest = (most, count, said, asks)
+        rest = (most, count, said, answers, asks)
         known = self._known.get(name)
         if known is not None and known[0] is action and known[1] == rest:
             return known[2]
-        found = _action_view(action, most, count, said, asks)
+        found = _action_view(action, most, count, said, answers, asks=asks)
         self._known[name] = action, rest, found
         return found
 
@@ -552,6 +539,9 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "lead": run.lead or msgspec.UNSET,
         "batons": run.batons or msgspec.UNSET,
         "watching": run.watching or msgspec.UNSET,
+        "people": (run.led and run.led.people) or msgspec.UNSET,
+        "questions": questions_of(run) or msgspec.UNSET,
+        "pauses": pauses_of(run) or msgspec.UNSET,
         "values": run.values or msgspec.UNSET,
         "sent_digest": run.sent_digest or msgspec.UNSET,
         "start_from": msgspec.UNSET
@@ -572,66 +562,14 @@ def _at_rest(seen: AtRest | None) -> AtRestShown | None:
     return None if seen is None else AtRestShown(seen.by, time(seen.at), seen.how)
 
 
-#: The states of a robot of which nothing moves any more.
-AT_REST: Final = frozenset({"unused", "proven", "seen", "unsent"})
-#: From the worst to the best.
-_WORST: Final = (
-    "unproven",
-    "unknown",
-    "silent",
-    "stopping",
-    "going",
-    "seen",
-    "proven",
-    "unsent",
-    "unused",
-)
-
-
-def rests_of(run: Run) -> list[RobotRestShown]:
-    """Return, for each robot of a led run, the state of its piece that is the furthest from
-    proven rest; none for other runs."""
-    if run.led is None:
-        return []
-    found: dict[str, list[RobotRestShown]] = {
-        robot: [] for robot in sorted(set(run.led.players.values()))
-    }
-    for each in run.rests.values():
-        found.setdefault(each.engine, []).append(_rest_view(run, each))
-    return [
-        min(shown, key=lambda each: _WORST.index(each.state))
-        if shown
-        else RobotRestShown(robot, "unused")
-        for robot, shown in found.items()
-    ]
-
-
-def _rest_view(run: Run, rest: PieceRest) -> RobotRestShown:
-    """Return the view of how far a piece is proven to be at rest. Once the whole run is over, its
-    proof or observation of rest counts for the piece, too."""
-    shown = RobotRestShown(
-        rest.engine,
-        rest.state,
-        time(rest.since),
-        rest.node,
-        rest.piece,
-        rest.why,
-        rest.by,
-        rest.stops,
-    )
-    if rest.rests or run.end is None:
-        return shown
-    is_proven = run.proof_at is not None and run.at_rest is None
-    at = _time(run.proof_at) if is_proven else None
-    state: RestState = "proven" if is_proven else "unknown"
-    return replace(shown, state=state, since=at, why="", stops=False)
-
-
 def visit_view(
-    each: Visit, robot: str = "", said: SaidShown | msgspec.UnsetType = msgspec.UNSET
+    each: Visit,
+    robot: str = "",
+    said: SaidShown | msgspec.UnsetType = msgspec.UNSET,
+    answered: AnswerShown | msgspec.UnsetType = msgspec.UNSET,
 ) -> VisitShown:
     """Return the view of one visit, with its times as datetimes. `robot`: the engine that played it
-    in a led run; `said`: the person who stated its result."""
+    in a led run; `said`: the person who stated its result; `answered`: the one who was asked."""
     return VisitShown(
         time(each.start),
         time(each.not_before),
@@ -643,6 +581,7 @@ def visit_view(
         robot or msgspec.UNSET,
         said,
         msgspec.UNSET if each.outputs is None else each.outputs,
+        answered,
     )
 
 
@@ -663,12 +602,23 @@ def words_for(said: Iterable[Said]) -> dict[int, SaidShown]:
 
 
 def _action_view(
-    action: ActionRun, most: int, count: VisitCount, said: Sequence[Said], asks: bool
+    action: ActionRun,
+    most: int,
+    count: VisitCount,
+    said: Sequence[Said],
+    answers: tuple[Answer, ...],
+    *,
+    asks: bool,
 ) -> ActionShown:
-    words = words_for(said)
+    words, answered = words_for(said), answers_by_visit(answers)
     first = action.older + len(action.visits) - len(action.visits[-most:]) + 1
     visits = [
-        visit_view(each, action.robot, words.get(number, msgspec.UNSET))
+        visit_view(
+            each,
+            action.robot,
+            words.get(number, msgspec.UNSET),
+            answered.get(number, msgspec.UNSET),
+        )
         for number, each in enumerate(action.visits[-most:], first)
     ]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]

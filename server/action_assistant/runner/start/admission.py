@@ -3,7 +3,7 @@ Pure."""
 
 import hashlib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
@@ -25,6 +25,14 @@ from action_assistant.runner.runs.sent_graphs import (
     read_sent,
     tree_of,
 )
+from action_assistant.runner.start.casting import (
+    people_of,
+    placed_on,
+    require_nobody_asked,
+    require_robots,
+    require_same_robots,
+    without_preset,
+)
 from action_assistant.runner.start.piece_texts import PieceText, texts_of
 from action_assistant.runner.start.start_from import Beginning, EarlierRun, beginning
 from action_assistant.umrf.breakpoints import Breakpoint, NoSuchPlace, pinned
@@ -45,6 +53,13 @@ from action_assistant.umrf.led_subgraphs import (
 )
 from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.pieces import Obstacle, handed_by, obstacles, piece_name
+from action_assistant.umrf.questions import (
+    Asked,
+    asked_in,
+    is_asked,
+    obstacles_of_questions,
+    without_asked,
+)
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 from action_assistant.umrf.start_values import (
@@ -65,6 +80,9 @@ _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 _PressId = Annotated[str, msgspec.Meta(max_length=200)]
 _NameText = Annotated[str, msgspec.Meta(max_length=1000)]
 Breakpoints = Annotated[tuple[Breakpoint, ...], msgspec.Meta(max_length=200)]
+
+#: Who answers the questions of a graph, by actor.
+People: TypeAlias = Annotated[dict[_NameText, _NameText], msgspec.Meta(max_length=100)]
 
 #: True for each robot of which a person says that they watch it.
 Watching: TypeAlias = Annotated[dict[_Name, bool], msgspec.Meta(max_length=100)]
@@ -88,7 +106,8 @@ class StartRequest(
     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
-    of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
+    of each actor ("" for actions without one), `people` who answers the questions of each actor: the id
+    of a person or of a group, "" for all who may run it; `lost`: see `Led`. `watching`: true for each robot of
     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
     version, as the editor seals them; without it, where there are rules, the run is for its starter
@@ -109,6 +128,7 @@ class StartRequest(
     subgraphs: tuple[SentSubgraph, ...] = ()
     tree_digest: str | None = None
     robots: dict[str, str] = {}
+    people: People = {}
     lost: Literal["stop", "wait"] = "stop"
     watching: Watching = {}
     drill: bool = False
@@ -197,6 +217,7 @@ class GroupRequest(
     subgraphs: tuple[SentSubgraph, ...] = ()
     tree_digest: str | None = None
     robots: dict[str, str] = {}
+    people: People = {}
     lost: Literal["stop", "wait"] = "stop"
     watching: Watching = {}
     drill: bool = False
@@ -220,6 +241,7 @@ class GroupRequest(
             subgraphs=self.subgraphs,
             tree_digest=self.tree_digest,
             robots=self.robots if engine == CONDUCTED else {},
+            people=self.people if engine == CONDUCTED else {},
             lost=self.lost,
             watching=self.watching
             if engine == CONDUCTED
@@ -358,6 +380,8 @@ def admit(
     else:
         graph = begins.graph if begins.before else _given(begins.graph, request.values)
         problems = [*reading.problems, *check(graph, None, facts, inside)]
+    if request.engine != CONDUCTED and any(map(is_asked, graph.actions)):
+        require_nobody_asked(graph, request.engine, _script(request)[0])
     _check_problems(problems, request.override)
     script, script_text = _script(request)
     return Admitted(
@@ -488,7 +512,8 @@ def _script(request: StartRequest) -> tuple[Script, str]:
     raw = bytes(request.script).strip()
     if raw in {b"", b"null"}:
         return Script({}), ""
-    if SIMULATOR not in {request.engine, *request.robots.values()}:
+    is_asked_only = request.engine == CONDUCTED and not request.robots
+    if SIMULATOR not in {request.engine, *request.robots.values()} and not is_asked_only:
         raise BadInput("Only the simulator follows a script.", where={"path": "/script"})
     try:
         script = script_from(msgspec.json.decode(raw))
@@ -514,7 +539,8 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     `by_robot`: all actions of a robot as one graph without arrows, which is looked at
     before the start and never sent. `problems`: what leading the graph means; `remedies`: what
     would take a problem away, by its code, as a sentence; `breakpoints`: where the run will wait;
-    `robots`: those of the request that the graph needs, by actor.
+    `robots`, `people`: those of the request that the graph needs, by actor; `asked`: the actions that
+    people answer, or for which the runner waits.
     """
 
     whole: Prepared
@@ -525,6 +551,8 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     remedies: dict[str, str] = {}
     breakpoints: tuple[Breakpoint, ...] = ()
     robots: dict[str, str] = {}
+    people: dict[str, str] = {}
+    asked: dict[str, Asked] = {}
 
 
 def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
@@ -548,6 +576,8 @@ def order_of(request: StartRequest, tree_digest: str, codes: Collection[str]) ->
         more["values"] = msgspec.to_builtins(request.values)
     if request.engine == CONDUCTED:
         more |= {"robots": request.robots, "lost": request.lost}
+    if request.people:
+        more["people"] = request.people
     if codes:
         more["override"] = sorted(set(codes))
     if request.start_from is not None:
@@ -575,31 +605,41 @@ def prepared_pieces(
     graph that cannot run as pieces. `earlier`: as of `admit`."""
     whole = prepared(request, facts, run, approved=approved, earlier=earlier)
     graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
-    actors = actors_in(graph, inside)
+    for_robots = without_asked(graph)
+    actors = actors_in(for_robots, inside)
     if whole.beginning is not None:  # what is skipped needs no robot
         robots = {actor: robot for actor, robot in request.robots.items() if actor in actors}
         request = msgspec.structs.replace(request, robots=robots)
-    _check_robots(request.robots, actors)
+    require_robots(request.robots, actors)
+    people = people_of(graph, request.people, is_part=whole.beginning is not None)
     if whole.beginning is not None and whole.beginning.before is not None:
-        _check_same_robots(request.robots, earlier)
+        require_same_robots(request.robots, earlier)
     breakpoints = pinned_in(graph, request.breakpoints)
-    hindering = (*subgraph_obstacles(graph, inside, request.robots), *obstacles(graph))
+    hindering = (
+        *obstacles_of_questions(inside),
+        *subgraph_obstacles(for_robots, inside, request.robots),
+        *obstacles(graph),
+    )
     if hindering:
         raise Conflict(
             _in_words(hindering),
             where={"path": "/umrf", "obstacles": msgspec.to_builtins(hindering[:_MOST_SHOWN])},
         )
-    played = players(graph, inside, request.robots)
-    placed = _placed_on(graph, played)
+    played = players(for_robots, inside, request.robots)
+    placed = placed_on(graph, played)
     problems = led_problems(placed, PINNED)
     by_robot: dict[str, list[Action]] = {}
     for action in graph.actions:
         robot = played.get(action.full_name, SIMULATOR)
         if robot != SIMULATOR:
             by_robot.setdefault(robot, []).append(action)
+    moving = {name: robot for name, robot in played.items() if robot != SIMULATOR}
+    asked = asked_in(graph, people, moving)
+    if not moving:
+        asked = without_preset(graph, asked, whole.script)
     return PreparedPieces(
         whole=whole,
-        players={name: robot for name, robot in played.items() if robot != SIMULATOR},
+        players=moving,
         texts=texts_of(graph, inside, codec.Stamp(whole.graph_id, request.version, run)),
         by_robot={
             robot: _part_of(whole, graph, robot, actions, inside)
@@ -609,15 +649,9 @@ def prepared_pieces(
         remedies=as_one_step(placed, problems, PINNED),
         breakpoints=breakpoints,
         robots=request.robots,
+        people=people,
+        asked=asked,
     )
-
-
-def _check_same_robots(robots: Mapping[str, str], earlier: EarlierRun | None) -> None:
-    """Raise Conflict if a run is to be continued on other robots: they are not where it ended."""
-    led = earlier.first.led if earlier is not None else None
-    if earlier is not None and led is not None and dict(robots) != led.robots:
-        text = f"Run {earlier.first.number} had other robots: continue it on these, or begin anew."
-        raise Conflict(text, where={"path": "/robots"})
 
 
 def pinned_in(graph: Graph, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:
@@ -662,27 +696,3 @@ def _in_words(hindering: Sequence[Obstacle]) -> str:
         f"{alike[0].text}{f' (and {len(alike) - 1} more)' if len(alike) > 1 else ''}"
         for alike in by_code.values()
     )
-
-
-def _check_robots(robots: Mapping[str, str], actors: Collection[str]) -> None:
-    """Raise BadInput unless exactly the actors of the graph have a robot."""
-    for actor in sorted(actors):
-        if not robots.get(actor):
-            who = f"{actor}'s actions" if actor else "the actions without an actor"
-            raise BadInput(f"Say which robot plays {who}.", where={"path": "/robots"})
-    for actor in sorted(robots):
-        if actor not in actors:
-            who = f"no action of {actor}" if actor else "no action without an actor"
-            raise BadInput(f"The graph has {who}.", where={"path": pointer("robots", actor)})
-
-
-def _placed_on(graph: Graph, played: Mapping[str, str]) -> Graph:
-    """Return the graph with the robot of each action as its actor, "" for the simulator, which moves
-    nothing. `played`: the robots by full name; two actors on one robot become one, and a sub-graph
-    has one."""
-    robots = {name: robot if robot != SIMULATOR else "" for name, robot in played.items()}
-    placed = tuple(
-        msgspec.structs.replace(each, actor=robots.get(each.full_name, each.actor))
-        for each in graph.actions
-    )
-    return msgspec.structs.replace(graph, actions=placed)

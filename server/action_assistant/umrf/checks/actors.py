@@ -30,6 +30,7 @@ from action_assistant.umrf.model import (
     Problem,
     Relation,
 )
+from action_assistant.umrf.questions import is_asked
 
 #: The most problems of one sub-graph that are reported at each action that stands for it.
 _INSIDE: Final = 20
@@ -61,7 +62,8 @@ def check_actors(subject: Subject, graphs: SubGraphs, flow: Flow | None = None) 
     its sub-graphs, which have been checked; `flow`: the result of `follow`, None if that was not
     called yet. Nothing is reported for the simulator, which performs the actions of all actors."""
     everywhere = (subject.graph, *(graphs.by_name[name] for name in graphs.found))
-    named = {a.actor for graph in everywhere for a in graph.actions if not a.missing} - {""}
+    played = (a for graph in everywhere for a in graph.actions if not a.missing)
+    named = {a.actor for a in played if not is_asked(a)} - {""}
     facts = subject.facts
     if len(named) < 2 or (facts.simulated and facts.synchronises):
         return

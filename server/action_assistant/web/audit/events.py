@@ -154,12 +154,12 @@ class PasskeyChanged(msgspec.Struct, frozen=True):
 
 
 class StartRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The author asked for a start, a change or a go-on that was refused, with the reason `why`.
+    """The author asked for a start, a change, a go-on or an answer that was refused, with the reason `why`.
     `engines`: the robots, or the simulator; `times`: how often within a minute."""
 
     kind: ClassVar[str] = "audit.start_refused.v1"
 
-    what: Literal["start", "change", "go_on"]
+    what: Literal["start", "change", "go_on", "answer"]
     why: str
     engines: tuple[str, ...] = ()
     graph: str = ""

@@ -27,6 +27,7 @@ _REFUSED: Final[Mapping[str, str]] = {
     "start": "was refused a start",
     "change": "was refused a change of a run",
     "go_on": "was refused to let a run go on",
+    "answer": "was refused to answer a question of a run",
 }
 _UNLISTED: Final[Mapping[str, str]] = {
     "strangers_refused": "minutes with refused strangers have no row: there were too many that day",
