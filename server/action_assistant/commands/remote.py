@@ -56,6 +56,13 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument("graph", metavar="GRAPH", help="id or name")
     run.add_argument("--engine", default="simulator", metavar="ROBOT", help="default: %(default)s")
     run.add_argument(
+        "--people",
+        type=_people,
+        metavar="ROLE=ID,…",
+        help="lead it step by step; a person or group, by id, answers the questions of each role, ROLE= "
+        "stands for all who may run it",
+    )
+    run.add_argument(
         "--robots",
         type=_robots,
         metavar="ACTOR=ROBOT,…",
@@ -229,6 +236,15 @@ def _robots(text: str) -> dict[str, str]:
     return robots
 
 
+def _people(text: str) -> dict[str, str]:
+    """Parse `Nurse=ID,Guard=` into who answers by role. Raise ArgumentTypeError for another text."""
+    pairs = [each.partition("=") for each in text.split(",")]
+    people = {role: who for role, _, who in pairs}
+    if len(people) < len(pairs) or any(not equals for _, equals, _ in pairs):
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form ROLE=ID,…, each role once")
+    return people
+
+
 def _add_release(release: argparse.ArgumentParser) -> None:
     add_server(release, "patrol@tested")
     release.add_argument(
@@ -345,12 +361,15 @@ def _run(options: argparse.Namespace) -> int:
         order["sight"] = server.editor("GET", f"/api/versions/{version['id']}/sight").json()
         if version.get("subgraphs"):
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
-        if options.robots is not None:
-            order |= {"engine": "conducted", "robots": options.robots, "lost": options.lost}
+        if options.robots is not None or options.people is not None:
+            robots, people = options.robots or {}, options.people or {}
+            order |= {"engine": "conducted", "robots": robots, "lost": options.lost}
+            order |= {"people": people} if people else {}
         if start is not None:
             order["from"] = start
         if continued is not None:
             led = {"robots": continued["robots"], "lost": options.lost}
+            led |= {"people": continued["people"]} if "people" in continued else {}
             order |= {"engine": "conducted", "values": continued.get("values", {}), **led}
         breakpoints = _breakpoints(server, version, options)
         if breakpoints:

@@ -23,6 +23,7 @@ from action_assistant.commands.client import (
     running,
 )
 from action_assistant.commands.drafts import changes_lines
+from action_assistant.commands.questions import add_questions
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.difference import Difference
@@ -46,7 +47,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
     more = runs.add_subparsers(
-        metavar="at-rest | wait | step | go-on | since | verify | archive | restore | copy | examples"
+        metavar="at-rest | wait | step | go-on | questions | answer | since | verify | archive | restore | copy | examples"
     )
     rests = command(
         more,
@@ -84,6 +85,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     goal.add_argument("--until", default="", metavar="NAME", help="all that come before this one")
     _add_watching(steps)
     steps.set_defaults(handler=_step)
+    add_questions(more)
     _add_archives(more)
     _add_copy(more)
     _add_since(more)
