@@ -18,8 +18,8 @@ from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.cli import main
 from action_assistant.commands.client import Server
+from action_assistant.commands.presses import press
 from action_assistant.commands.remote import insisting, stopped_as, verdict
-from action_assistant.commands.runs import press
 from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from action_assistant.commands.client import Server, command, print_json, running
+from action_assistant.commands.presses import press
 from action_assistant.errors import RequestRefused
 from action_assistant.safe_text import one_line
 
@@ -86,8 +87,6 @@ def _shown(value: Any) -> str:
 def _answer(options: argparse.Namespace) -> int:
     """Run the command that answers a question, and return the exit code. Raise RequestRefused if it is
     not open any more, or the answer does not fit."""
-    from action_assistant.commands.runs import press
-
     path = f"/api/runs/{options.run}/questions/{options.question}"
     with running(options) as server:
         asked = {"value": _value(options, server, path)}

@@ -3,8 +3,6 @@
 import argparse
 import asyncio
 import sys
-import time
-import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -23,6 +21,7 @@ from action_assistant.commands.client import (
     running,
 )
 from action_assistant.commands.drafts import changes_lines
+from action_assistant.commands.presses import press
 from action_assistant.commands.questions import add_questions
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line, told
@@ -30,15 +29,12 @@ from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines, without_looks
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
-    import httpx
-
     from action_assistant.editor.history.course_search import SinceWhen
     from action_assistant.runner.analysis.expected_runs import Expectation
 
 
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
 _AT_REST: Final = frozenset({"unused", "proven", "seen", "unsent"})  # states of a robot
-_AGAIN_S: Final = 1.0  # after which an order without an answer is sent once more
 
 
 def _add_runs(runs: argparse.ArgumentParser) -> None:
@@ -168,18 +164,6 @@ def _wait(options: argparse.Namespace) -> int:
     if unknown:
         print(one_line(f"NOT KNOWN to be at rest: {', '.join(unknown)}"))
     return 0
-
-
-def press(server: Server, path: str, body: dict[str, Any]) -> "httpx.Response":
-    """Send an order to a led run (POST of `body` to `path`), and return the answer. If none comes, send
-    it once more with the same request id, so that the two count once. Raise CannotStart if there is no
-    answer then either."""
-    press = body | {"request_id": str(uuid.uuid4())}
-    try:
-        return server.runner("POST", path, json=press)
-    except CannotStart:
-        time.sleep(_AGAIN_S)
-        return server.runner("POST", path, json=press)
 
 
 def _runs(options: argparse.Namespace) -> int:

@@ -42,7 +42,7 @@ class Waiting(msgspec.Struct, frozen=True):
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
-    """Return the routes."""
+    """Return the routes: the questions that wait, those of a run, answers and photos."""
 
     @get(
         "/api/questions",
