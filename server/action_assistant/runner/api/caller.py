@@ -46,14 +46,24 @@ async def body_of(
     since only few bodies of each person are in memory at once. Raise TooLarge if too many wait,
     Unavailable if the body does not arrive in time, Litestar's RequestEntityTooLarge if it is too
     large."""
+    async with bytes_of(request, body_limit) as body:
+        if len(body) > MOST and counted(body) > MOST:
+            raise RequestEntityTooLarge
+        yield body
+
+
+@asynccontextmanager
+async def bytes_of(
+    request: Request[Any, Any, Any], body_limit: ConcurrencyLimit
+) -> AsyncIterator[bytes]:
+    """Return a context with the body of a request, whatever it is, as `body_of` does; its route says how
+    large it may be."""
     async with body_limit.turn(person_of(request).id):
         try:
             with anyio.fail_after(_BODY_S):
                 body = await request.body()
         except TimeoutError as late:
             raise Unavailable(f"The body did not come within {_BODY_S:.0f} s.") from late
-        if len(body) > MOST and counted(body) > MOST:
-            raise RequestEntityTooLarge
         yield body
 
 

@@ -6,7 +6,7 @@ import msgspec
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.runner.api.caller import author_of, body_of
+from action_assistant.runner.api.caller import author_of, bytes_of
 from action_assistant.runner.api.refused_starts import StartNeeds, noted
 from action_assistant.runner.api.run_guard import require_command_role, unseen_by
 from action_assistant.runner.api.services import RunnerServices
@@ -29,7 +29,6 @@ _Asking = Request[Any, Any, Any]
 #: A photo is nothing but a picture, whoever opens its address.
 _PICTURE: Final = {
     "content-security-policy": "default-src 'none'; sandbox",
-    "x-content-type-options": "nosniff",
     "content-disposition": "inline",
     "cache-control": "private, max-age=31536000, immutable",
 }
@@ -100,7 +99,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         author, me = author_of(request), identity_of(request)
         commands = services.control.questions
         await commands.require_photo(run, question, author, me)  # before it is read
-        async with body_of(request, services.body_limit) as body:
+        async with bytes_of(request, services.body_limit) as body:
             return await commands.send_photo(run, question, body, services.photos, author, me)
 
     @get(
