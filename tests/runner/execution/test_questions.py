@@ -24,6 +24,7 @@ from action_assistant.umrf.questions import READY_MADE
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Person
 from runner.execution.test_conductor import Lab
+from runner.execution.test_continued_runs import asked
 from runner.execution.test_led_breakpoints import go_on
 from runner.execution.test_led_steps import now
 from runner.harness import ANN, BEN, Harness, clock_us, ended, order, sequence, until, virtual
@@ -294,6 +295,17 @@ def test_a_graph_that_asks_people_is_not_handed_over_whole(engine: str) -> None:
             assert lab.david.starts == []
 
     lived()
+
+
+@virtual
+async def test_the_look_before_a_start_says_who_is_asked() -> None:
+    lab = Lab()
+    async with lab.runner() as control:
+        graph = line(CONFIRM, "Scout", asking("AaWait", 2, seconds=5.0))
+        (look, _) = await control.look(asked(asked_of(graph)), "ann")
+        texts = {each.code: each.text for each in look.items}
+        assert texts["asks"] == "People answer AaConfirm_0. The runner waits for AaWait_2."
+        assert "simulator" not in texts["moves"]
 
 
 @virtual

@@ -43,6 +43,7 @@ from action_assistant.runner.start.admission import (
     watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.casting import require_not_led
 from action_assistant.runner.start.led_items import (
     INDEXING,
     beginning_items,
@@ -210,10 +211,7 @@ class StartChecks:
                 )
             return await self._accept_conducted(request, starter)
         earlier = await self._earlier.read(request, starter)
-        if request.robots:
-            raise BadInput("Only a led run has several robots.", where={"path": "/robots"})
-        if request.people:
-            raise BadInput("Only a led run asks people.", where={"path": "/people"})
+        require_not_led(request.robots, request.people)
         watched_in(request.watching, engines_of(request))
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request, earlier)

@@ -90,3 +90,11 @@ def placed_on(graph: Graph, played: Mapping[str, str]) -> Graph:
         for each in graph.actions
     )
     return msgspec.structs.replace(graph, actions=placed)
+
+
+def require_not_led(robots: Mapping[str, str], people: Mapping[str, str]) -> None:
+    """Raise BadInput if a start has what only that of a led run has."""
+    if robots:
+        raise BadInput("Only a led run has several robots.", where={"path": "/robots"})
+    if people:
+        raise BadInput("Only a led run asks people.", where={"path": "/people"})

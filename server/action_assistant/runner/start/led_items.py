@@ -42,6 +42,8 @@ def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
     """Return the items about a graph that is led step by step: which robots it moves, and what differs
     from handing it over as a whole."""
     found = [_moving(ready)]
+    if ready.asked:
+        found.append(_asking(ready))
     for code, verdict, text in _LED:
         problems = tuple(each for each in ready.problems if each.code == code)
         if problems:
@@ -85,15 +87,32 @@ def _moving(ready: PreparedPieces) -> Item:
     """Return the pre-flight item that says which robots a led run moves, with the number of actions
     of each, and how many actions only the simulator plays."""
     played = Counter(ready.players.values())
-    simulated = len(ready.whole.actions) - played.total()
+    simulated = len(ready.whole.actions) - played.total() - len(ready.asked)
     robots = [f"{name} ({counted(count, 'action')})" for name, count in sorted(played.items())]
     if not robots:
-        text = "Only the simulator plays: nothing moves."
+        text = "Only the simulator plays: nothing moves." if simulated else "Nothing moves."
     else:
         text = f"{', '.join(robots)} may begin to move at any time until the run ends."
         if simulated:
             text += f" The simulator plays {counted(simulated, 'other action')} and moves nothing."
     return Item(code="moves", verdict="passed", text=text)
+
+
+def _asking(ready: PreparedPieces) -> Item:
+    """Return the pre-flight item that says which actions people answer, and for which the runner waits."""
+    people = [name for name, each in ready.asked.items() if each.by == "people"]
+    waits = [name for name, each in ready.asked.items() if each.by == "runner"]
+    texts: list[str] = []
+    if people:
+        texts.append(f"People answer {_listed(people)}.")
+    if waits:
+        texts.append(f"The runner waits for {_listed(waits)}.")
+    return Item(code="asks", verdict="passed", text=" ".join(texts))
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return f"{', '.join(names[:5])}{more}"
 
 
 def led_item(robot: Registration) -> Item:
