@@ -72,12 +72,14 @@ def start(words: Sequence[str], environ: Mapping[str, str], log: Path) -> Proces
     """Start `python -m action_assistant` with `words` in a session of its own; what it writes is added to
     `log`."""
     with log.open("ab") as out:
-        if not _is_usual(environ):
+        # A URL with a password makes `serve` begin anew, and leave its spares behind.
+        if not _is_usual(environ) or "--database" in words:
             command = [sys.executable, *_MODULE, *words]
             return subprocess.Popen(
                 command, env={**environ}, stdout=out, stderr=out, start_new_session=True
             )
-        # The interpreter of `make ros` cannot be forked from this one. tests/ros and the browser take it.
+        # The interpreter of `make ros` cannot be forked from this one. tests/ros, the browser and tests
+        # of robots with `new_interpreters` take it.
         given = {_RUNNER_PYTHON: sys.executable, **environ}
         return _Fork(_forker(), words, given, out.fileno())
 

@@ -189,6 +189,7 @@ async def test_a_yes_from_the_same_browser_under_another_name_is_no_second_perso
         await until(lambda: not control.open)
 
 
+@pytest.mark.usefixtures("new_interpreters")  # forks have no rclpy, so no robot for the check
 def test_a_browser_is_known_again_by_both_processes_after_somebody_has_signed_out(
     tmp_path: Path,
 ) -> None:

@@ -27,6 +27,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 from support.openapi import documents
+from support.warm import NEW_INTERPRETERS
 from web.auth.rights_lab import (
     EVERY,
     PROGRAMS,
@@ -361,6 +362,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
     """A server of its own, with a robot."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("ACTION_ASSISTANT_LIMITS", "off")
+        environment.setenv(NEW_INTERPRETERS, "1")  # forks have no rclpy, so they start no robot
         with sharing(tmp_path_factory.mktemp("matrix") / "data") as product:
             found = Lab(product)
             with contextlib.closing(found.owner), contextlib.closing(found.robots):
