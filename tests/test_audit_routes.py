@@ -49,6 +49,8 @@ EXCEPT: Final = {
     "runner delete /api/confirmations/{request_id}": "a request that confirmed nobody is given up",
     "runner post /api/confirmations/{request_id}/answer": "in tests of confirmations on devices",
     "runner post /api/approvals/asked": "a message to others; the yes itself is an event",
+    "runner post /api/runs/{run}/questions/{question}/answer": "run.question_answered, in tests/runner/api/test_questions.py",
+    "runner post /api/runs/{run}/questions/{question}/photo": "the row is that of the answer with it",
     "editor post /api/mentions/read": "a mark of what one has read oneself",
     "editor post /api/notifications/{name}/test": "audit.owner_did, where a receiver is set",
     "runner post /api/notifications/{name}/test": "audit.owner_did, where a receiver is set",

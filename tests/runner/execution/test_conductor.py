@@ -348,10 +348,10 @@ async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_o
         assert said is not msgspec.UNSET
         assert (said.by, said.reason) == (BEN, "It stands at the door.")
         lines = exports.intervals(lab.harness.journal.history(run)).decode().splitlines()
-        assert [line.split(",")[-2:] for line in lines] == [
-            ["robot", "said_by"],
-            ["David", BEN.name],
-            ["Carol", ""],
+        assert [line.split(",")[-3:] for line in lines] == [
+            ["robot", "said_by", "answered_by"],
+            ["David", BEN.name, ""],
+            ["Carol", "", ""],
         ]
 
 
