@@ -57,7 +57,7 @@ test("the script is the default, and behaviours are a choice beside it", async (
   await expect(dialog.getByRole("radio", { name: /^Simulator/ })).toHaveAccessibleName(
     "Simulator its Python code may move something",
   );
-  const hold = dialog.getByRole("button", { name: "Start v1 on the simulator" });
+  const hold = dialog.getByRole("button", { name: "Run v1 in the simulator" });
   await expect(hold).toBeEnabled();
   await hold.focus();
   await page.keyboard.down("Enter");
@@ -74,7 +74,7 @@ test("one that cannot be run is said before the start, which is not offered then
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
   const looked = dialog.getByRole("region", { name: "Checks before the start" });
   await expect(looked.getByText("broken.py cannot be read: it is not UTF-8")).toBeVisible();
-  await expect(dialog.getByRole("button", { name: /^Start v1: Something/ })).toBeDisabled();
+  await expect(dialog.getByRole("button", { name: /^Run v1: Something/ })).toBeDisabled();
   await dialog.getByRole("radio", { name: /^Simulated/ }).check();
-  await expect(dialog.getByRole("button", { name: "Start v1 on the simulator" })).toBeEnabled();
+  await expect(dialog.getByRole("button", { name: "Run v1 in the simulator" })).toBeEnabled();
 });

@@ -164,7 +164,10 @@ export async function fitView(page: Page): Promise<void> {
   await atRest(page);
 }
 
-/** Holds a button for as long as it asks for; `down` and `up` are those of a mouse, a key or a finger. */
+/**
+ * Holds a button for as long as it asks for, or presses one that is not to be held; `down` and `up` are those
+ * of a mouse, a key or a finger.
+ */
 export async function hold(
   button: Locator,
   down: () => Promise<unknown>,
@@ -172,6 +175,11 @@ export async function hold(
 ): Promise<void> {
   const element = await button.elementHandle();
   if (element === null) throw new Error(`${button} is not there`);
+  if (!(await element.getAttribute("title"))?.endsWith("(hold)")) {
+    await down();
+    await up();
+    return;
+  }
   await element.evaluate((pressed) => {
     const held = new Promise<void>((done) => {
       let isHeld = false;
@@ -216,9 +224,9 @@ export async function saved(page: Page): Promise<void> {
   await expect(stored).toBeVisible();
 }
 
-/** Holds Start for as long as it asks for. */
+/** Starts a run in the simulator. */
 export async function start(page: Page): Promise<void> {
-  const button = page.getByRole("button", { name: /^Start v\d+ in the simulator/ });
+  const button = page.getByRole("button", { name: /^Run v\d+ in the simulator/ });
   await expect(button).toBeEnabled();
   const box = await boxOf(button);
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);

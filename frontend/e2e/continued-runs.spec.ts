@@ -83,7 +83,7 @@ test("a person chooses what becomes of an action that was under way, and the run
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
   await page.getByRole("button", { name: "Continue …" }).click();
-  const start = dialog(page).getByRole("button", { name: /^Start v\d+/ });
+  const start = dialog(page).getByRole("button", { name: /^Run v\d+/ });
   await expect(start).toHaveText(/Choose for Grip/);
   await expect(start).toBeDisabled();
   const question = dialog(page).getByRole("group", { name: /Grip on the simulator had begun/ });

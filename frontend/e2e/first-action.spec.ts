@@ -88,7 +88,7 @@ test("an action with a pose goes from nothing to a package that compiles", async
   await page.getByRole("button", { name: "Choose where to start" }).click();
   const dialog = page.getByRole("dialog", { name: /^Start v1/ });
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
-  await dialog.getByRole("button", { name: "Start v1 on the simulator" }).focus();
+  await dialog.getByRole("button", { name: "Run v1 in the simulator" }).focus();
   await page.keyboard.down("Enter");
   await expect(dialog).toBeHidden();
   await page.keyboard.up("Enter");

@@ -36,7 +36,7 @@ async function firstView(
   path: string,
   isThere: (page: Page) => Promise<unknown>,
 ): Promise<FirstView> {
-  const { context } = await product.person(browser, "Ada", { loadsAhead: false });
+  const { context } = await product.person(browser, "Ada", { loadsAhead: false, panels: "folded" });
   const storageState = await context.storageState();
   await context.close();
   const cold = await browser.newContext({ storageState });

@@ -268,7 +268,7 @@ test("a dry-run is played by keys and records nothing", async ({ browser }) => {
   await expect(bar).toContainText("Wait 0 runs");
   await page.keyboard.press("3");
   await expect(bar).toContainText("Wait 0 ends with an error");
-  await bar.getByRole("button", { name: /^Record this/ }).focus();
+  await bar.getByRole("button", { name: /^Run in the simulator/ }).focus();
   await page.keyboard.down("Enter");
   await expect(bar).toBeHidden();
   await page.keyboard.up("Enter");

@@ -45,7 +45,7 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   await page.keyboard.press("F9");
   await saved(page);
   const led = dialog(page).getByRole("radio", { name: /^Lead it/ });
-  const start = dialog(page).getByRole("button", { name: /^Start v\d+, step by step, on/ });
+  const start = dialog(page).getByRole("button", { name: /^Run v\d+, step by step, in/ });
 
   await page.getByRole("button", { name: "Choose where to start" }).click();
   await expect(led).toBeChecked();
@@ -87,7 +87,7 @@ test("on the canvas of a run people let it wait at an action and an arrow, and g
   await page.keyboard.press("F9");
   await saved(page);
   await page.getByRole("button", { name: "Choose where to start" }).click();
-  const start = dialog(page).getByRole("button", { name: /^Start v\d+, step by step, on/ });
+  const start = dialog(page).getByRole("button", { name: /^Run v\d+, step by step, in/ });
   await expect(start).toBeEnabled({ timeout: 15_000 });
   await holdEnter(page, start);
   await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });

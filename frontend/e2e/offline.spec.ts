@@ -216,7 +216,7 @@ test("the page opens without a server, with what the device keeps, and says what
   await expect(card(page, "Kept")).toBeVisible();
   await add(page, "Alone");
   await offline(page, 1);
-  await expect(page.getByRole("button", { name: /^Start v1: not connected/ })).toBeDisabled();
+  await expect(page.getByRole("button", { name: /^Run v1: not connected/ })).toBeDisabled();
   await page.getByRole("button", { name: /^Stop everything/ }).click();
   await expect(page.getByText(/NOT SENT|MAY REACH NOBODY/).first()).toBeVisible();
   await page.screenshot({ path: test.info().outputPath("offline.png") });

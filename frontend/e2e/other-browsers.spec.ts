@@ -48,13 +48,13 @@ for (const engine of ENGINES) {
       expect(actions.map(({ name }) => name)).toEqual(["Peek", "Rummage"]);
       expect(actions[1]?.parents).toHaveLength(1);
       await browser.picture(test.info().outputPath("drawn.png"));
-      await browser.press("button", "Start v1 in the simulator", 900);
+      await browser.press("button", "Run v1 in the simulator", 900);
       await expect.poll(newest, { timeout: 30_000 }).toBe("finished");
       await browser.sees("finished");
 
       await browser.go(`${product.url}/graphs/${await product.chain(60)}`);
       await browser.until(SAVED);
-      await browser.press("button", "Start v1 in the simulator", 900);
+      await browser.press("button", "Run v1 in the simulator", 900);
       await expect.poll(newest).toBe("running");
       await browser.press("button", "Stop run|Stop everything");
       await expect.poll(newest).toBe("stopped");
@@ -88,7 +88,7 @@ for (const engine of ENGINES) {
         })
         .toBe(31);
       await browser.picture(test.info().outputPath("outline.png"));
-      await browser.press("button", "Start v1 in the simulator", 900);
+      await browser.press("button", "Run v1 in the simulator", 900);
       await expect.poll(newest).toBe("running");
       await browser.press("button", "Stop run|Stop everything");
       await expect.poll(newest).toBe("stopped");

@@ -1,6 +1,6 @@
 /** What stands beside the canvas: the lists, folded to a rail and back, and the details. */
 
-import { expect, test } from "@playwright/test";
+import { expect, type Page, test } from "@playwright/test";
 import { atRest, card, saved } from "./canvas";
 import { LONG, Product } from "./product";
 
@@ -10,15 +10,49 @@ test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
+const FIRST = { panels: "folded" } as const;
+
+/** Return the share of the window that the canvas has: of its area, and of its width. */
+function share(page: Page): Promise<readonly [area: number, width: number]> {
+  return page.evaluate(() => {
+    const box = document.querySelector(".react-flow")?.getBoundingClientRect();
+    const [width, height] = box ? [box.width / innerWidth, box.height / innerHeight] : [0, 0];
+    return [width * height, width] as const;
+  });
+}
+
+test("the canvas has most of the window, and the details leave it most of the width", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada", FIRST);
+  await page.goto(`${product.url}/graphs/${await product.chain(3)}`);
+  await saved(page);
+  for (const [width, height, area, beside] of [
+    [1440, 900, 0.84, 0.76],
+    [1280, 720, 0.8, 0.7],
+  ] as const) {
+    await page.setViewportSize({ width, height });
+    await expect.poll(async () => (await share(page))[0]).toBeGreaterThanOrEqual(area);
+    await card(page, "Wait", 0).click();
+    await expect(page.getByRole("complementary", { name: "Details" })).toBeVisible();
+    await expect.poll(async () => (await share(page))[1]).toBeGreaterThanOrEqual(beside);
+    await page.keyboard.press("Escape");
+  }
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
 test("the lists fold to a rail by which each is opened and put away, also by keys", async ({
   browser,
 }) => {
-  const { page, context, failures } = await product.person(browser, "Ada");
+  const { page, context, failures } = await product.person(browser, "Ada", FIRST);
   await page.goto(`${product.url}/graphs/${await product.chain(2)}`);
   await saved(page);
   const rail = page.getByRole("navigation", { name: "Lists" });
   const library = page.getByRole("complementary", { name: "Library" });
   const search = library.getByRole("textbox", { name: "Search graphs and actions" });
+  await expect(library).toBeHidden();
+  await rail.getByRole("button", { name: "Unfold the list" }).click();
   await expect(rail).toHaveCount(0);
   await library.getByRole("button", { name: "Fold the list" }).click();
   await expect(library).toBeHidden();
@@ -72,8 +106,7 @@ test("the lists fold to a rail by which each is opened and put away, also by key
 test("beside the rail the details are there while something is chosen, or when asked for", async ({
   browser,
 }) => {
-  const { page, context, failures } = await product.person(browser, "Ada");
-  await page.addInitScript(() => localStorage.setItem("aa.list-folded", "true"));
+  const { page, context, failures } = await product.person(browser, "Ada", FIRST);
   await page.goto(`${product.url}/graphs/${await product.chain(4)}`);
   await saved(page);
   const details = page.getByRole("complementary", { name: "Details" });

@@ -118,7 +118,7 @@ test("STOP is at one place, apart from Start, and everything is large enough for
     expect(stop?.height).toBeGreaterThanOrEqual(60);
     expect((stop?.y ?? 0) + (stop?.height ?? 0)).toBeGreaterThan(820);
     expect(stop).toEqual(home);
-    const begin = await page.getByRole("button", { name: /^Start v1/ }).boundingBox();
+    const begin = await page.getByRole("button", { name: /^Run v1/ }).boundingBox();
     // More than two fingers beside each other.
     expect((stop?.x ?? 0) - (begin?.x ?? 0) - (begin?.width ?? 0)).toBeGreaterThan(80);
     const small = await page.evaluate(() => {
@@ -134,7 +134,7 @@ test("STOP is at one place, apart from Start, and everything is large enough for
     expect(small, name).toEqual([]);
   }
 
-  const start = page.getByRole("button", { name: /^Start v1 in the simulator/ });
+  const start = page.getByRole("button", { name: /^Run v1 in the simulator/ });
   await expect(start).toBeEnabled();
   await press(page, start);
   await pane(page, "Run");

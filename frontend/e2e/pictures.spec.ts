@@ -112,7 +112,8 @@ const BRISK = { after_s: 0.6 };
 
 for (const scheme of ["light", "dark"] as const) {
   test(`desktop, ${scheme}`, async ({ browser }) => {
-    const options = { colorScheme: scheme, viewport: { width: 1440, height: 900 } };
+    const viewport = { width: 1440, height: 900 };
+    const options = { colorScheme: scheme, viewport, panels: "folded" } as const;
     const { page, context } = await product.person(browser, "Ada", options);
     const mari = await product.person(browser, "Mari", options);
     const id = await withRobots("prepare_delivery", `delivery_${scheme}`, ["rover"]);
@@ -137,7 +138,7 @@ for (const scheme of ["light", "dark"] as const) {
 }
 
 test("a dry-run", async ({ browser }) => {
-  const options = { viewport: { width: 1440, height: 900 } };
+  const options = { viewport: { width: 1440, height: 900 }, panels: "folded" } as const;
   const { page, context } = await product.person(browser, "Ada", options);
   await page.goto(await graph("valve_inspection"));
   await saved(page);

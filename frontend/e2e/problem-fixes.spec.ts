@@ -64,7 +64,7 @@ test("a one-sided arrow says what it would do, is mended, and the mending is und
   const arrow = page.getByLabel(/^Arrow from Look 0.* Grip 0\. 1 wrong\. .*abort.*\(H2\)/).first();
   await expect(arrow).toBeAttached();
   await expect(page.locator("[title*='abort'][title$='(H2)']").first()).toBeVisible();
-  await expect(page.getByRole("button", { name: /^Start v1: 2 wrong/ })).toBeDisabled();
+  await expect(page.getByRole("button", { name: /^Run v1: 2 wrong/ })).toBeDisabled();
 
   // In the panel: consequence, place to jump to, fix, and the code last.
   await page.getByTitle("2 wrong: this prevents a start").click();
@@ -88,7 +88,7 @@ test("a one-sided arrow says what it would do, is mended, and the mending is und
   await expect(page.locator("li[data-code=H2]")).toHaveCount(0);
   await saved(page);
   expect(await parents(id)).toEqual({ Look: [], Grip: ["Look"], Drop: ["Look"] });
-  await expect(page.getByRole("button", { name: /^Start v1 in the simulator/ })).toBeEnabled();
+  await expect(page.getByRole("button", { name: /^Run v1 in the simulator/ })).toBeEnabled();
   await page.getByRole("button", { name: "Undo" }).click();
   await expect(page.locator("li[data-code=H2]")).toHaveCount(2);
   // Nothing is left: the layout when the graph was opened is no step of a person.

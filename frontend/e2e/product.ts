@@ -170,10 +170,11 @@ export class Product {
   async person(
     browser: Browser,
     name: string,
-    { loadsAhead = LONG === "", ...options }: PersonOptions = {},
+    { loadsAhead = LONG === "", panels = "open", ...options }: PersonOptions = {},
   ): Promise<Person> {
     const context = await browser.newContext(options);
     this.contexts.push(context);
+    if (panels === "open") await context.addInitScript(keepPanelsOpen);
     if (!loadsAhead) await context.addInitScript(saveData);
     const page = await context.newPage();
     const failures: string[] = [];
@@ -189,7 +190,17 @@ export class Product {
 
 /** `loadsAhead`: whether the page loads what it does not show yet while it has nothing to do, as it does but
  * where data is to be saved. That costs more than the first page, so in CI only those do who need it. */
-export type PersonOptions = Parameters<Browser["newContext"]>[0] & { loadsAhead?: boolean };
+export type PersonOptions = Parameters<Browser["newContext"]>[0] & {
+  loadsAhead?: boolean;
+  /** `open`: the person has the lists and the course of the run beside the canvas; else they are as at first. */
+  panels?: "open" | "folded";
+};
+
+/** A person who has once folded a panel keeps it folded. */
+function keepPanelsOpen(): void {
+  for (const panel of ["aa.list-folded", "aa.strip-folded"])
+    if (localStorage.getItem(panel) === null) localStorage.setItem(panel, "false");
+}
 
 function saveData(): void {
   Object.defineProperty(navigator, "connection", { value: { saveData: true } });

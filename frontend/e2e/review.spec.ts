@@ -269,7 +269,7 @@ test("a run starts again through the dialog of every start, looked at and held",
   await page.getByRole("menuitem", { name: "v1 again …" }).click();
   const dialog = page.getByRole("dialog", { name: "Start v1 of chain_3" });
   await expect(dialog.getByRole("radio", { name: /Simulator/ })).toBeChecked();
-  const hold = dialog.getByRole("button", { name: "Start v1 on the simulator" });
+  const hold = dialog.getByRole("button", { name: "Run v1 in the simulator" });
   await expect(hold).toBeEnabled();
   await hold.focus();
   await page.keyboard.down("Enter");

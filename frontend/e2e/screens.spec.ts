@@ -88,7 +88,10 @@ for (const [name, options] of Object.entries(SCREENS)) {
       ["long", await make(LONG, [LONG, `${LONG}_too`, "Short"])],
       ["rtl", await make(RIGHT_TO_LEFT, [RIGHT_TO_LEFT, "נסיעה", "Short"])],
     ] as const;
-    const { page, context } = await product.person(browser, "Ada", options);
+    const { page, context } = await product.person(browser, "Ada", {
+      ...options,
+      panels: "folded",
+    });
     await taken(page, `${name}-graphs`);
     for (const path of [
       "runs",
@@ -111,7 +114,10 @@ for (const [name, options] of Object.entries(SCREENS)) {
 }
 
 test("graphs of every size", async ({ browser }) => {
-  const { page, context } = await product.person(browser, "Ada", SCREENS.light);
+  const { page, context } = await product.person(browser, "Ada", {
+    ...SCREENS.light,
+    panels: "folded",
+  });
   for (const size of SIZES) {
     await editor(page, await make(`size_${size}`, Array(size).fill("Step"), ["rover"]));
     await page.getByRole("button", { name: "Fit", exact: true }).click();

@@ -92,7 +92,7 @@ test("a dry-run asks as a start does, and is played with what is given", async (
   const valve = asked.getByRole("textbox", { name: "valve of Turn" });
   const moment = bar.getByRole("slider", { name: "Moment" });
   await expect(
-    bar.getByRole("button", { name: /^Record this: Give valve of Turn/ }),
+    bar.getByRole("button", { name: /^Run in the simulator: Give valve of Turn/ }),
   ).toBeDisabled();
   await asked.getByRole("textbox", { name: "torque of Turn" }).fill("61");
   await expect(asked).toContainText("60 at most.");
@@ -101,13 +101,13 @@ test("a dry-run asks as a start does, and is played with what is given", async (
   await expect(moment).toHaveAttribute("aria-valuetext", /Turn runs/);
   await bar.getByRole("button", { name: "2 values" }).click();
   await expect(asked).toBeHidden();
-  await expect(bar.getByRole("button", { name: /^Record this: start v1/ })).toBeEnabled();
+  await expect(bar.getByRole("button", { name: /^Run in the simulator: v1/ })).toBeEnabled();
   await bar.getByRole("button", { name: "Close the dry-run" }).click();
 });
 
 test("the simulator asks too: nothing starts without what is open, and nothing beyond its bounds", async () => {
   const { page } = ada;
-  await page.getByRole("button", { name: /^Start v1 on simulator/ }).click();
+  await page.getByRole("button", { name: /^Run v1 in the simulator …/ }).click();
   await expect(start(page, /Give valve of Turn/)).toBeDisabled();
   const valve = values(page).getByRole("textbox", { name: "valve of Turn" });
   const torque = values(page).getByRole("textbox", { name: "torque of Turn" });
@@ -121,7 +121,7 @@ test("the simulator asks too: nothing starts without what is open, and nothing b
   await expect(start(page, /Correct torque of Turn/)).toBeDisabled();
   await torque.fill("6.5");
   await valve.fill("valve_8");
-  const held = start(page, /^Start v1 on the simulator/);
+  const held = start(page, /^Run v1 in the simulator/);
   await expect(held).toBeEnabled({ timeout: 15_000 });
   await expect(dialog(page).getByText('Turn valve = "valve_8"')).toBeVisible();
   await holdEnter(page, held);
@@ -133,11 +133,11 @@ test("the simulator asks too: nothing starts without what is open, and nothing b
 test("the next start begins with these values, and what is changed is looked at anew, on a phone too", async () => {
   const { page } = ada;
   await page.setViewportSize({ width: 390, height: 844 });
-  await page.getByRole("button", { name: /^Start v1 on simulator/ }).click();
+  await page.getByRole("button", { name: /^Run v1 in the simulator …/ }).click();
   const valve = values(page).getByRole("textbox", { name: "valve of Turn" });
   await expect(valve).toHaveValue("valve_8");
   await expect(values(page).getByRole("textbox", { name: "torque of Turn" })).toHaveValue("6.5");
-  const held = start(page, /^Start v1 on the simulator/);
+  const held = start(page, /^Run v1 in the simulator/);
   await expect(held).toBeEnabled({ timeout: 15_000 });
   await valve.fill("\u202eeno");
   await expect(values(page)).toContainText("no control characters");

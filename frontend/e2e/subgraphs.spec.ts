@@ -61,7 +61,7 @@ test("an edit of the graph inside is told outside, and its actions run", async (
 
   await page.getByRole("button", { name: "Choose where to start" }).click();
   const dialog = page.getByRole("dialog");
-  const begin = dialog.getByRole("button", { name: /^Start v1 (on|in) / });
+  const begin = dialog.getByRole("button", { name: /^Run v1 in / });
   await expect(begin).toBeEnabled({ timeout: 15_000 });
   await begin.focus();
   await page.keyboard.down("Enter");

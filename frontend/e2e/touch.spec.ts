@@ -92,7 +92,7 @@ async function tie(page: Page, from: Locator, to: Locator): Promise<void> {
 }
 
 async function hold(page: Page, fingers: Fingers): Promise<void> {
-  const start = page.getByRole("button", { name: /^Start v\d+ in the simulator/ });
+  const start = page.getByRole("button", { name: /^Run v\d+ in the simulator/ });
   await expect(start).toBeEnabled();
   await fingers.rest(
     await middle(start),

@@ -100,11 +100,11 @@ test("try it, run it and stop it in the simulator", async ({ browser }) => {
   await picture(page, "dry-run");
   await bar.getByRole("button", { name: "Close the dry-run" }).click();
 
-  await holdNamed(page, /^Start v1 in the simulator/);
+  await holdNamed(page, /^Run v1 in the simulator/);
   await expect(card(page, "Water").getByText("running")).toBeVisible({ timeout: 20_000 });
   await fitView(page);
   await picture(page, "run");
-  await holdNamed(page, /^Start v1 in the simulator/);
+  await holdNamed(page, /^Run v1 in the simulator/);
   await page.keyboard.press("Control+.");
   await expect(page.getByText(/Run 2: stopped/)).toBeVisible();
   await context.close();

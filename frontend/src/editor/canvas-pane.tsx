@@ -36,7 +36,7 @@ import { useCanvasElements } from "./canvas/use-canvas-elements";
 import { useFirstLayout } from "./canvas/use-first-layout";
 import { useUnfolding, useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
-import { Toolbar } from "./menus/toolbar";
+import { Toolbar, ZoomTools } from "./menus/toolbar";
 import type { EditorState } from "./use-editor";
 import type { Past } from "./use-past";
 
@@ -112,14 +112,18 @@ function EmptyCanvas({ waiting, context }: { waiting: boolean; context: EditorCo
   );
 }
 
-/** Shows the tools at the bottom left, and `children` in the other corner. */
-function PaneFoot(props: { compact: boolean; hidden: boolean; children: ReactNode }) {
+/** Shows the tools at the bottom left, the zoom at the right, and `children` above it. `phone`: there is room
+ * for a few tools only. */
+function PaneFoot(props: { phone: boolean; hidden: boolean; children: ReactNode }) {
   return (
     <div className={style.foot}>
       <div className={style.tools} data-covers="bottom" data-hidden={props.hidden || undefined}>
-        <Toolbar compact={props.compact} />
+        <Toolbar words={!props.phone} />
       </div>
-      <div className={style.corner}>{props.children}</div>
+      <div className={style.corner}>
+        {props.children}
+        {!props.phone && <ZoomTools />}
+      </div>
     </div>
   );
 }
@@ -213,10 +217,7 @@ function PaneInFlow(props: Props) {
           <EmptyCanvas waiting={waiting} context={context} />
           {!compact && <Robots />}
           <FollowFrame />
-          <PaneFoot
-            compact={compact || side !== null}
-            hidden={phone && (isDryRun ?? isPast) === true}
-          >
+          <PaneFoot phone={phone || side !== null} hidden={phone && (isDryRun ?? isPast) === true}>
             {lost && <FollowRun onFollow={onFollow} />}
             {!context.dryRun && corner}
           </PaneFoot>

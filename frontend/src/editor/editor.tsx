@@ -257,7 +257,7 @@ function useSummary(
   const [placing, setPlacing] = useState(false);
   const wide = useIsWide();
   const phone = useIsPhone();
-  const [folded, setFolded] = useKept("aa.strip-folded", false);
+  const [folded, setFolded] = useKept("aa.strip-folded", true);
   const [selected = null] = context.graph.actions
     .filter((action) => context.selection.has(action.key))
     .map((action) => action.key);

@@ -1,5 +1,6 @@
 /** A graph as a card: how it is, and who is in it. */
 import { IconDots } from "@tabler/icons-react";
+import type { ComponentType } from "react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
 import { useKnownColors } from "../api/people";
@@ -51,9 +52,11 @@ interface GraphCardProps {
   last: Run | null;
   /** The names on the way to its folder, where it is in another one than the one on screen. */
   place: string;
+  /** The button that runs it in the simulator for the first time. */
+  Try: ComponentType<{ graph: GraphSummary }>;
 }
 
-export function GraphCard({ graph, last, place }: GraphCardProps) {
+export function GraphCard({ graph, last, place, Try }: GraphCardProps) {
   const now = useNow(20_000);
   const at = instant(graph.updated_at);
   const { robots = [], labels = [], people = [] } = graph;
@@ -103,6 +106,11 @@ export function GraphCard({ graph, last, place }: GraphCardProps) {
           </div>
         </div>
       </Link>
+      {last === null && graph.actions !== 0 && graph.actions !== undefined && (
+        <div className={home.try}>
+          <Try graph={graph} />
+        </div>
+      )}
       <LateOpening opens="menu" part={(button) => <GraphMenu graph={graph} button={button} />}>
         <button
           type="button"

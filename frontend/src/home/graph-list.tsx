@@ -2,7 +2,7 @@
 import { NativeSelect, Skeleton, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconAlertTriangle, IconSearch } from "@tabler/icons-react";
-import { type ReactNode, useEffect, useMemo, useState } from "react";
+import { type ComponentProps, type ReactNode, useEffect, useMemo, useState } from "react";
 import { type Folder, folderPath } from "../api/folders";
 import { useGraphLabels, useGraphPages } from "../api/graph-list";
 import { errorText } from "../api/http";
@@ -28,6 +28,7 @@ interface Props {
   none: ReactNode;
   /** Copies on this device, shown while the list cannot be read. */
   kept: ReactNode;
+  Try: ComponentProps<typeof GraphCard>["Try"];
   /** Stands before the graphs, and not before what a search or a label finds in all folders inside. */
   children: ReactNode;
 }
@@ -98,7 +99,7 @@ function Tools({ search, onSearch, labels, label, onLabel, order, onOrder }: Too
   );
 }
 
-export function GraphList({ folders, folder, none, kept, children }: Props) {
+export function GraphList({ folders, folder, none, kept, Try, children }: Props) {
   const { now: live, runner } = useLive();
   const listed = useRuns(runner).data;
   const [typed, setTyped] = useState("");
@@ -171,6 +172,7 @@ export function GraphList({ folders, folder, none, kept, children }: Props) {
                 graph={graph}
                 last={newestRun(live, graph.id) ?? runs.get(graph.id) ?? null}
                 place={deep && graph.folder !== folder ? folderPath(folders, graph.folder) : ""}
+                Try={Try}
               />
             ))}
           </div>

@@ -1,7 +1,7 @@
 /** The first page: every graph by folders, and how to begin. */
 import { Button } from "@mantine/core";
 import { IconFileImport, IconPlus } from "@tabler/icons-react";
-import type { ReactNode } from "react";
+import type { ComponentProps, ReactNode } from "react";
 import { useSearch } from "wouter";
 import { folderWay, useFolders } from "../api/folders";
 import { useMay } from "../api/people";
@@ -18,6 +18,7 @@ interface Props {
   kept: ReactNode;
   /** Before the graphs: what is asked of who comes for the first time. */
   greeting?: ReactNode;
+  Try: ComponentProps<typeof GraphList>["Try"];
 }
 
 function NoGraphs({ onNew }: Pick<Props, "onNew">) {
@@ -41,7 +42,7 @@ function NoGraphs({ onNew }: Pick<Props, "onNew">) {
   );
 }
 
-export function Home({ onNew, onImport, kept, greeting }: Props) {
+export function Home({ onNew, onImport, kept, greeting, Try }: Props) {
   const mayEdit = useMay("edit");
   const known = useFolders();
   const folders = known.data ?? [];
@@ -85,6 +86,7 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
             folder={folder}
             none={known.isSuccess && <NoGraphs onNew={onNew} />}
             kept={kept}
+            Try={Try}
           >
             <FolderCards folder={folder} folders={folders} />
           </GraphList>

@@ -42,7 +42,10 @@ function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
   );
 }
 
-/** `alone`: the editor does not answer, so "Live" would be said of half of the page. */
+/**
+ * Says nothing while all is well and no robot moves. `alone`: the editor does not answer, so it is said that the
+ * robots still do.
+ */
 export function ConnectionStatus({
   run,
   whose = false,
@@ -57,9 +60,11 @@ export function ConnectionStatus({
     return (
       <span className="inline-flex gap-40">
         {run && run.ended_at === null && !run.simulated && <LastSeen run={run} whose={whose} />}
-        <span className={style.word} data-link="live">
-          <i aria-hidden /> {alone ? "Robots live" : "Live"}
-        </span>
+        {alone && (
+          <span className={style.word} data-link="live">
+            <i aria-hidden /> Robots live
+          </span>
+        )}
       </span>
     );
   }

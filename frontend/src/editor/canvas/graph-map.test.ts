@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import type { PartOnCard } from "../../canvas/editor-store";
 import type { CanvasNode } from "../../canvas/elements";
 import type { Action } from "../../graph/model";
-import { isWithin, mapFrame, mapMarks, seenArea } from "./graph-map";
+import { mapFrame, mapMarks, needsMap, seenArea } from "./graph-map";
 
 const card = (x: number, y: number, actor = "") =>
   ({
@@ -43,18 +43,14 @@ test("the map of an empty graph shows the visible part", () => {
   });
 });
 
-test("the map is needed if any part of the graph is out of sight", () => {
+test("the map is needed if a graph of more than a screen and a half is not all in sight", () => {
   const seen = { x: 0, y: 0, width: 800, height: 600 };
-  const at = (x: number, y: number) => ({ x, y, width: 200, height: 100 });
-  expect(isWithin(at(0, 0), seen)).toBe(true);
-  expect(isWithin(at(600, 500), seen)).toBe(true);
-  for (const [x, y] of [
-    [-1, 0],
-    [601, 0],
-    [0, -1],
-    [0, 501],
-  ] as const)
-    expect(isWithin(at(x, y), seen)).toBe(false);
+  const at = (x: number, y: number, width: number, height: number) => ({ x, y, width, height });
+  expect(needsMap(at(0, 0, 1_210, 100), seen)).toBe(true);
+  expect(needsMap(at(700, 0, 100, 910), seen)).toBe(true);
+  expect(needsMap(at(-100, 0, 1_200, 900), seen)).toBe(false);
+  expect(needsMap(at(5_000, 5_000, 200, 100), seen)).toBe(false);
+  expect(needsMap(at(0, 0, 800, 600), seen)).toBe(false);
 });
 
 test("the map shows the actions of an expanded graph in the colours of their states", () => {

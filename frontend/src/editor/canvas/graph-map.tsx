@@ -106,14 +106,21 @@ export function seenArea(view: Viewport, size: { width: number; height: number }
   return { x: -x / zoom, y: -y / zoom, width: size.width / zoom, height: size.height / zoom };
 }
 
-/** Return whether all of an area is visible. */
-export function isWithin(area: MapArea, seen: MapArea): boolean {
-  return (
+/** How many screens of graph are looked through without a map. */
+const SCREENS = 1.5;
+
+/**
+ * Return whether a map helps: the graph is larger than a screen and a half in a direction, and not all of it is
+ * visible. A smaller map would only cover the graph.
+ */
+export function needsMap(area: MapArea, seen: MapArea): boolean {
+  const isWithin =
     area.x >= seen.x &&
     area.y >= seen.y &&
     area.x + area.width <= seen.x + seen.width &&
-    area.y + area.height <= seen.y + seen.height
-  );
+    area.y + area.height <= seen.y + seen.height;
+  const isLarge = area.width > SCREENS * seen.width || area.height > SCREENS * seen.height;
+  return isLarge && !isWithin;
 }
 
 interface MapFrame extends MapArea {
@@ -216,8 +223,7 @@ export function GraphMap({ nodes, flow }: Props) {
   const frame = mapFrame(area, seen);
   useWheelZoom(map, flow);
   const hands = useDragging(flow, frame.scale);
-  // The map is hidden while everything is visible: it would only cover the graph.
-  const visibility = area === null || isWithin(area, seen) ? "hidden" : undefined;
+  const visibility = area === null || !needsMap(area, seen) ? "hidden" : undefined;
   return (
     <Panel position="top-right" className="react-flow__minimap" style={{ ...MAP_SIZE, visibility }}>
       <svg

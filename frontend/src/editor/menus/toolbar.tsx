@@ -1,16 +1,15 @@
-/** The toolbar of the canvas, with the button for the menu of all edit actions. */
+/** The toolbar of the canvas, with the button for the menu of all edit actions, and the zoom beside it. */
 import { ActionIcon } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
+import { useStore } from "@xyflow/react";
 import { memo } from "react";
 import {
   add,
   fit,
   marquee,
   note,
-  pan,
   redo,
   removeSelection,
-  snap,
   tidy,
   undo,
   zoomIn,
@@ -19,13 +18,20 @@ import {
 import { type EditAction, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
-import { useStableCallback } from "../../ui/hooks";
+import { useHasFingersOnly, useStableCallback } from "../../ui/hooks";
 import { LateOpening } from "../../ui/late-opening";
 import { lazyPart } from "../../ui/lazy-part";
 import { Tooltip } from "../../ui/tooltip";
 import style from "./toolbar.module.css";
 
-function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boolean }) {
+interface ToolProps {
+  editAction: EditAction;
+  pressed?: boolean;
+  /** The word beside the sign; without it the sign stands alone. */
+  word?: string | false;
+}
+
+function Tool({ editAction, ...look }: ToolProps) {
   const context = useEditorContext();
   const run = useStableCallback(() => editAction.run(context));
   const parts = {
@@ -33,26 +39,18 @@ function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boole
     disabled: !isEnabled(editAction, context),
     run,
   };
-  return (
-    <ToolButton
-      editAction={editAction}
-      {...parts}
-      {...(pressed === undefined ? {} : { pressed })}
-    />
-  );
+  return <ToolButton editAction={editAction} {...parts} {...look} />;
 }
 
-interface ToolButtonProps {
-  editAction: EditAction;
+interface ToolButtonProps extends ToolProps {
   label: string;
   disabled: boolean;
-  pressed?: boolean;
   run: () => void;
 }
 
 /** Memoized: most edits do not change how a tool looks. */
 const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
-  const { editAction, label, disabled, pressed, run } = props;
+  const { editAction, label, disabled, pressed, word, run } = props;
   const Sign = editAction.icon;
   return (
     <Tooltip
@@ -68,11 +66,13 @@ const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
         aria-label={editAction.label}
         aria-pressed={pressed}
         data-pressed={pressed || undefined}
+        data-word={word || undefined}
         className={style.tool ?? ""}
         disabled={disabled}
         onClick={run}
       >
         <Sign size={17} aria-hidden />
+        {word && <span>{word}</span>}
       </ActionIcon>
     </Tooltip>
   );
@@ -97,23 +97,47 @@ function AllActionsButton() {
   );
 }
 
-export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) {
-  const { tool, selection, snap: snapping } = useEditorContext();
+/**
+ * What is needed again and again; all else is in the menu at its end. Without a keyboard there is also what
+ * only keys would do, and the mode that selects several is shown while it is on. `words`: there is room
+ * for words.
+ */
+export const Toolbar = memo(function Toolbar({ words }: { words: boolean }) {
+  const { tool, selection } = useEditorContext();
+  const fingers = useHasFingersOnly();
+  const isSelecting = tool === "select";
   return (
     <div className={style.bar} role="toolbar" aria-label="Canvas tools">
-      <Tool editAction={add} />
-      <Tool editAction={marquee} pressed={tool === "select"} />
-      {!compact && <Tool editAction={pan} pressed={tool === "pan"} />}
+      <Tool editAction={add} word={words && "Add"} />
+      {(fingers || isSelecting) && <Tool editAction={marquee} pressed={isSelecting} />}
       <Tool editAction={undo} />
       <Tool editAction={redo} />
-      {(!compact || selection.size > 0) && <Tool editAction={removeSelection} />}
-      {!compact && <Tool editAction={note} />}
-      {!compact && <Tool editAction={tidy} />}
-      {!compact && <Tool editAction={snap} pressed={snapping} />}
-      {!compact && <Tool editAction={zoomOut} />}
-      {!compact && <Tool editAction={zoomIn} />}
-      <Tool editAction={fit} />
+      {fingers && selection.size > 0 && <Tool editAction={removeSelection} />}
+      {words && <Tool editAction={tidy} word="Tidy" />}
+      {words && <Tool editAction={note} word="Note" />}
+      {!words && <Tool editAction={fit} />}
       <AllActionsButton />
+    </div>
+  );
+});
+
+function ZoomShown() {
+  const percent = useStore(({ transform }) => Math.round(transform[2] * 100));
+  return (
+    <output className={style.zoom} aria-label="Zoom">
+      {percent} %
+    </output>
+  );
+}
+
+/** The zoom of the canvas, and the buttons that change it. */
+export const ZoomTools = memo(function ZoomTools() {
+  return (
+    <div className={style.bar} role="toolbar" aria-label="Zoom">
+      <Tool editAction={zoomOut} />
+      <ZoomShown />
+      <Tool editAction={zoomIn} />
+      <Tool editAction={fit} word="Fit" />
     </div>
   );
 });

@@ -14,9 +14,9 @@ export const ROW = '[role="treegrid"] [data-row][tabindex="0"]';
 /** Selector of the newest entry of the history. */
 export const ENTRY_BUTTON = "[data-history] [data-entry]";
 
-/** Keeps on this device whether the lists are folded to a rail. */
+/** Keeps on this device whether the lists are folded to a rail, as they are at first. */
 function useFoldedList() {
-  const [folded, setFolded] = useKept("aa.list-folded", false);
+  const [folded, setFolded] = useKept("aa.list-folded", true);
   return { folded, setFolded };
 }
 

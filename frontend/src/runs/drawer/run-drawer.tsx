@@ -26,9 +26,7 @@ export function RunDrawer(props: Props) {
       <DrawerFrame mode={low}>
         <div className={style.none}>
           <IconTimeline size={18} aria-hidden />
-          <span>
-            Not run yet. Hold <b>Start</b> and every action appears here as a lane, while it runs.
-          </span>
+          <span>Not run yet. While the graph runs, every action appears here as a lane.</span>
         </div>
       </DrawerFrame>
     );

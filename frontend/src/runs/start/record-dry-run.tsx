@@ -5,8 +5,7 @@ import { useVersions } from "../../api/graphs";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
 import type { StartValues } from "../../api/starts";
-import { HoldButton } from "../../ui/hold-button";
-import { isolated } from "../../words/isolated";
+import { StartButton } from "./start-button";
 import { nextLabel, useStart } from "./use-start";
 
 interface Props {
@@ -28,18 +27,19 @@ export function RecordDryRun({ graph, seq, obstacle, script, values, onStarted }
   const label = nextLabel(versions, seq);
   const why = now.link === "down" ? "The runner does not answer" : obstacle;
   return (
-    <HoldButton
+    <StartButton
+      held={false}
       size="compact-sm"
       icon={<IconPlayerPlayFilled size={12} aria-hidden />}
-      label="Start on the simulator"
+      label="Run in the simulator"
       name={
         why === null
-          ? `Record this: start ${label} in the simulator, as decided here`
-          : `Record this: ${why}`
+          ? `Run in the simulator: ${label}, as decided here; it is recorded`
+          : `Run in the simulator: ${why}`
       }
-      question={`Start ${isolated(label)} in the simulator with the decisions made here? It is recorded as a run.`}
+      question=""
       disabled={why !== null || start.isPending}
-      onHeld={() =>
+      onStart={() =>
         start.mutate(
           { seq, engines: [SIMULATOR], digest: null, script, values },
           { onSuccess: onStarted },

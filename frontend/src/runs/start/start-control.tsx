@@ -1,4 +1,4 @@
-/** Start: held, for the simulator; robots are chosen and looked at in a dialog first. */
+/** Start: one press in the simulator, where nothing moves; robots are chosen and looked at in a dialog first. */
 import { ActionIcon, Button } from "@mantine/core";
 import { IconChevronDown, IconPlayerPlayFilled } from "@tabler/icons-react";
 import { useState } from "react";
@@ -8,9 +8,9 @@ import { CONDUCTED } from "../../api/led-runs";
 import { openRuns } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
-import { HoldButton } from "../../ui/hold-button";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { isolated } from "../../words/isolated";
+import { StartButton } from "./start-button";
 import style from "./start-control.module.css";
 import { lastEngines, nextLabel, notifyFailure, useStart } from "./use-start";
 
@@ -57,26 +57,30 @@ export function StartControl(props: Props) {
       : obstacle;
   const simulated = engines.every((engine) => engine === SIMULATOR);
   const icon = <IconPlayerPlayFilled size={13} aria-hidden />;
-  const words = start.isPending ? "Starting …" : `Start ${isolated(label)}`;
   const led = engines.includes(CONDUCTED);
-  const where = led ? "step by step" : `on ${engines.map(isolated).join(", ")}`;
-  const wide = compact ? words : `${words} ${where} …`;
+  const where = led
+    ? "step by step"
+    : simulated
+      ? "in the simulator"
+      : `on ${engines.map(isolated).join(", ")}`;
+  const first = start.isPending
+    ? "Starting …"
+    : `${simulated ? "Run" : "Start"} ${isolated(label)}`;
+  const wide = compact ? first : `${first} ${where} …`;
+  const run = `${first} ${where}`;
   const ask = () =>
     void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
   return (
     <span className={style.start} data-thumb={thumb || undefined}>
       {simulated && !asks ? (
-        <HoldButton
+        <StartButton
+          held={goes}
           icon={thumb ? undefined : icon}
-          label={thumb ? <TwoLines first={words} second="hold · simulator" /> : words}
-          name={why === null ? `Start ${label} in the simulator` : `Start ${label}: ${why}`}
-          question={
-            goes
-              ? `A run of this graph is going on already. Start ${isolated(label)} beside it, in the simulator?`
-              : `Start exactly ${isolated(label)}, as it is on screen, in the simulator?`
-          }
+          label={thumb ? <TwoLines first={first} second="simulator" /> : compact ? first : run}
+          name={why === null ? run : `${first}: ${why}`}
+          question={`A run of this graph is going on already. Run ${isolated(label)} beside it, in the simulator?`}
           disabled={why !== null}
-          onHeld={() => start.mutate({ seq: settle(), engines: [SIMULATOR], digest: null })}
+          onStart={() => start.mutate({ seq: settle(), engines: [SIMULATOR], digest: null })}
         />
       ) : (
         <Button
@@ -91,11 +95,9 @@ export function StartControl(props: Props) {
           }
           onClick={ask}
         >
-          <span aria-hidden>{thumb ? <TwoLines first={words} second={`${where} …`} /> : wide}</span>
+          <span aria-hidden>{thumb ? <TwoLines first={first} second={`${where} …`} /> : wide}</span>
           <span className="visually-hidden">
-            {why === null
-              ? `Start ${isolated(label)} ${where} …`
-              : `Start ${isolated(label)}: ${why}`}
+            {why === null ? `${first} ${where} …` : `${first}: ${why}`}
           </span>
         </Button>
       )}

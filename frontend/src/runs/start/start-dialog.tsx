@@ -24,7 +24,6 @@ import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
 import { lineWords, valueLines } from "../../status/value-words";
 import { useWatching, WatchTicks } from "../../status/watching";
-import { HoldButton } from "../../ui/hold-button";
 import { textScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
@@ -32,6 +31,7 @@ import { useAskedValues, ValueList } from "./asked-values";
 import { actorsIn, castObstacle, castOf, LedChoice, movesWords, WayChoice } from "./led-choice";
 import { PreflightList } from "./preflight-list";
 import { SecondPerson } from "./second-person";
+import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";
 import { useStartFrom } from "./start-from";
 import { lastLed, rememberEngines, rememberLed, useStart } from "./use-start";
@@ -395,7 +395,7 @@ export function StartDialog(props: Props) {
       onStarted?.(runs);
     };
     const looked = { digest, ...(tree && { tree }) };
-    const what = {
+    const sent = {
       seq,
       engines: asked,
       ...(order && { led: order }),
@@ -410,12 +410,16 @@ export function StartDialog(props: Props) {
       watch.forget();
       setDrills(false);
     };
-    start.mutate({ ...what, ...override }, { onSuccess: done, onSettled });
+    start.mutate({ ...sent, ...override }, { onSuccess: done, onSettled });
   };
   // Of a part only some robots are looked at: those of the others are not needed.
   const moving = beginning && looks ? engines.filter((each) => isLooked(looks, each)) : engines;
   const where = moving.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   const how = led ? ", step by step," : "";
+  const moves = moving.some((engine) => engine !== SIMULATOR);
+  const verb = moves ? "Start" : "Run";
+  const at = moves ? `on ${where.map(isolated).join(", ")}` : "in the simulator";
+  const what = `${verb} ${isolated(label)}${how} ${at}`;
   return (
     <Modal
       opened
@@ -529,17 +533,14 @@ export function StartDialog(props: Props) {
           moves={led && way.missing === null ? movesWords(castFor(cast, moving)) : ""}
           values={values}
         />
-        <HoldButton
+        <StartButton
+          held={moves}
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
-          label={why ?? "Hold to start"}
-          name={
-            why === null
-              ? `Start ${label}${how} on ${where.map(isolated).join(", ")}`
-              : `Start ${label}: ${why}`
-          }
+          label={why ?? (moves ? "Hold to start" : what)}
+          name={why === null ? what : `${verb} ${label}: ${why}`}
           question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(castFor(cast, moving))}` : ""}`}
           disabled={why !== null}
-          onHeld={begin}
+          onStart={begin}
         />
       </footer>
     </Modal>
