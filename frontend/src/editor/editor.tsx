@@ -38,7 +38,7 @@ import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
 import { useIsPhone, useIsWide, useKept, useStableCallback } from "../ui/hooks";
-import { boundedPart } from "../ui/lazy-part";
+import { boundedPart, Later, useOnceIdle } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
 import { CanvasPane } from "./canvas-pane";
 import { Overlays } from "./menus/overlays";
@@ -326,14 +326,17 @@ function barParts(
   search: string,
   rename: (name: string) => boolean,
 ): EditorBarParts {
+  const drawn = summary.seq > 0;
   return {
     crumbs: crumbsOf(context, search, rename),
     status: (
       <>
-        <LevelStatus />
+        <Later drawn={drawn}>
+          <LevelStatus />
+        </Later>
         <SaveStatus />
         <ProblemCount told={told} />
-        {!summary.compact && status}
+        {!summary.compact && <Later drawn={drawn}>{status}</Later>}
       </>
     ),
     actions: <StillPeople me={me} />,
@@ -363,11 +366,11 @@ function placeAction(context: EditorContext, template: NewAction): boolean {
   return true;
 }
 
-/** Loads panels early whose keyboard shortcuts may be followed by typing at once. */
-function usePreloaded(): void {
-  useEffect(() => {
+/** Loads panels early whose keyboard shortcuts may be followed by typing at once; the cards come before. */
+function usePreloaded(drawn: boolean): void {
+  useOnceIdle(drawn, () => {
     for (const part of [Inspector, QuickAdd, FindBar]) void part.preload();
-  }, []);
+  });
 }
 
 export function Editor(props: Props) {
@@ -376,15 +379,16 @@ export function Editor(props: Props) {
   const past = usePast();
   const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel, past);
   const link = useThrottledLink();
+  const drawn = link.seq > 0;
   const search = useSearch();
   const rename = useRenameGraph(context);
   const { problems, told, marks } = useProblemGroups(id, link.seq, context.graph);
   const threads = useThreads();
   useOpenThreadsOnCards(threads);
-  useRemoteEditAnnouncements(context.graph, link.seq > 0);
+  useRemoteEditAnnouncements(context.graph, drawn);
   useRunAnnouncements(context.graph, progress);
   useShortcuts(context);
-  usePreloaded();
+  usePreloaded(drawn);
   useSeededDryRun(context, props.seed);
 
   const place = (template: NewAction) => {
@@ -449,8 +453,16 @@ export function Editor(props: Props) {
         {beginning !== null && props.begin}
       </EditorSummaryContext>
       <RoomNotices />
-      <LateParts />
-      <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
+      <Later drawn={drawn}>
+        <LateParts />
+      </Later>
+      <Overlays
+        drawn={drawn}
+        context={context}
+        known={known}
+        overlay={overlay}
+        onClose={editor.closeOverlay}
+      />
       {adding !== null && (
         <QuickAdd context={context} request={adding} known={known} onClose={editor.closeAdd} />
       )}

@@ -2,7 +2,16 @@
 
 import { Button, Loader } from "@mantine/core";
 import { IconPlugConnectedX } from "@tabler/icons-react";
-import { Component, type ComponentType, type ReactNode, Suspense, use } from "react";
+import {
+  Component,
+  type ComponentType,
+  type ReactNode,
+  Suspense,
+  use,
+  useEffect,
+  useRef,
+  useState,
+} from "react";
 import { Empty } from "./empty";
 import style from "./lazy-part.module.css";
 
@@ -158,6 +167,21 @@ export function OpeningBoundary({ button, children }: { button: ReactNode; child
     </>
   );
   return <PartBoundary frame={beside}>{children}</PartBoundary>;
+}
+
+const LATER_WITHIN = 1_000; // ms after the first drawing
+
+/** Calls `work` once the page rests after what comes first is drawn. `drawn`: it is. */
+export function useOnceIdle(drawn: boolean, work: () => void): void {
+  const now = useRef(work);
+  useEffect(() => (drawn ? whenIdle(() => now.current(), LATER_WITHIN) : undefined), [drawn]);
+}
+
+/** What is not seen at first: it is loaded and drawn after what comes first, once the page rests. */
+export function Later(props: { drawn: boolean; children: ReactNode }): ReactNode {
+  const [isTime, setTime] = useState(false);
+  useOnceIdle(props.drawn, () => setTime(true));
+  return isTime && props.children;
 }
 
 const SOON = 500; // ms, in Safari, which does not say when that is

@@ -1,9 +1,8 @@
 /** Opens menus, the command palette and dialogs over the editor, one at a time. */
 
-import { useEffect } from "react";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
-import { lazyPart, OverlayBoundary, PartBoundary } from "../../ui/lazy-part";
+import { Later, lazyPart, OverlayBoundary, PartBoundary, useOnceIdle } from "../../ui/lazy-part";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
 const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
@@ -30,6 +29,8 @@ const PackagesDialog = lazyPart(() =>
 const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 
 interface Props {
+  /** The graph is on screen. */
+  drawn: boolean;
   context: EditorContext;
   /** Actions that can be added. */
   known: readonly NewAction[];
@@ -38,15 +39,17 @@ interface Props {
 }
 
 export function Overlays(props: Props) {
-  // Loaded early: people may type right after the shortcut that opens them.
-  useEffect(() => {
+  // Loaded early: people may type right after the shortcut that opens them. The cards come before.
+  useOnceIdle(props.drawn, () => {
     for (const part of [ArrowDialog, CommandPalette, ContextMenu]) void part.preload();
-  }, []);
+  });
   return (
     <>
       {/* Invisible until somebody prints: the browser prints the page as it is. */}
       <PartBoundary frame={() => null}>
-        <GraphPrint context={props.context} />
+        <Later drawn={props.drawn}>
+          <GraphPrint context={props.context} />
+        </Later>
       </PartBoundary>
       <OverlayBoundary>
         <OpenOverlay {...props} />

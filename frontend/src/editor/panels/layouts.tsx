@@ -6,7 +6,7 @@ import {
   IconLayoutSidebarLeftCollapse,
   IconLayoutSidebarRight,
 } from "@tabler/icons-react";
-import { type ReactNode, useEffect, useRef } from "react";
+import { type ReactNode, useEffect, useRef, useState } from "react";
 import { actionDrag } from "../../canvas/action-drag";
 import { dryRun } from "../../edit-actions/dry-run-actions";
 import { isEnabled } from "../../edit-actions/edit-action";
@@ -201,12 +201,20 @@ function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
   );
 }
 
+/** Return true from the first time on that a panel is open: its contents are loaded then, and stay. */
+function useOpened(open: boolean): boolean {
+  const [opened, setOpened] = useState(open);
+  if (open && !opened) setOpened(true);
+  return open || opened;
+}
+
 /** Shows the lists beside the canvas, or over it on a narrow screen or beside a rail. */
 function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) {
   const { left, side, folded, fold } = panels;
   const carrying = useWatched(actionDrag) !== null;
   const beside = wide && !folded;
   const open = beside || (left && !carrying);
+  const opened = useOpened(beside || left);
   return (
     <>
       {wide && folded && <ListRail panels={panels} told={told} />}
@@ -220,13 +228,17 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
         data-open={open || undefined}
         aria-label="Library"
       >
-        <div className={style.sides}>
-          <SideTabs panels={panels} />
-          {beside && <FoldButton fold={fold} />}
-        </div>
-        <div className="fill-y">
-          {side === "outline" ? outline : side === "history" ? history : list}
-        </div>
+        {opened && (
+          <>
+            <div className={style.sides}>
+              <SideTabs panels={panels} />
+              {beside && <FoldButton fold={fold} />}
+            </div>
+            <div className="fill-y">
+              {side === "outline" ? outline : side === "history" ? history : list}
+            </div>
+          </>
+        )}
       </aside>
     </>
   );
@@ -269,6 +281,7 @@ function useDetails(wide: boolean, { folded, right, setRight }: Panels) {
 export function DesktopLayout(props: DesktopParts) {
   const { wide, panels, stage, find, details, strip, status } = props;
   const { open, asked } = useDetails(wide, panels);
+  const opened = useOpened(open);
   useSelectedInView(wide && panels.folded && open);
   return (
     <main
@@ -296,7 +309,7 @@ export function DesktopLayout(props: DesktopParts) {
         data-open={open || undefined}
         aria-label="Details"
       >
-        {details}
+        {opened && details}
       </aside>
     </main>
   );
