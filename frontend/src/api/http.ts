@@ -59,7 +59,7 @@ export function isFinal(error: unknown): boolean {
 
 export interface RequestOptions {
   method?: "GET" | "POST" | "PUT" | "PATCH" | "DELETE";
-  /** An object is sent as JSON, a string as it is (also JSON). */
+  /** An object is sent as JSON, a string as it is (also JSON), and a file as its bytes. */
   body?: unknown;
   signal?: AbortSignal | undefined;
   /** Milliseconds until an answer must be there. */
@@ -133,7 +133,8 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
     signal: ask.signal ? AbortSignal.any([ask.signal, patience]) : patience,
   };
   if (ask.viewKey !== undefined) init.headers = { authorization: `Bearer ${ask.viewKey}` };
-  if (ask.body !== undefined) {
+  if (ask.body instanceof Blob) init.body = ask.body;
+  else if (ask.body !== undefined) {
     init.headers = { "content-type": "application/json" };
     init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
   }

@@ -12,6 +12,8 @@ export const CONDUCTED = "conducted";
 export interface LedOrder {
   readonly robots: Readonly<Record<string, string>>;
   readonly lost: "stop" | "wait";
+  /** The group or person that answers the questions of each role; "" for all who may run it. */
+  readonly people?: Readonly<Record<string, string>>;
 }
 
 /** Return the engines that carry out a run, sorted: one, or all those of a led run. */

@@ -222,7 +222,10 @@ const unanswered = new Map<string, string>();
  * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
  * thing is sent with the same id, so that the two count once.
  */
-async function sendPress<T>(what: string, send: (request: string) => Promise<T>): Promise<T> {
+export async function sendPress<T>(
+  what: string,
+  send: (request: string) => Promise<T>,
+): Promise<T> {
   const request = unanswered.get(what) ?? newAid();
   unanswered.set(what, request);
   try {

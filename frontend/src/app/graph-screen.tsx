@@ -22,6 +22,7 @@ import { serverNow } from "../clock/server-clock";
 import { scriptOf } from "../dry-run/script";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, useEditorSummary } from "../editor/editor";
+import { isReadyMade } from "../graph/questions";
 import { robotNames } from "../graph/robots";
 import { templatesOf, useKnownActions, usePlaceable } from "../home/known-actions";
 import { askedDryRun, useReplay } from "../review/replay";
@@ -240,7 +241,7 @@ function Draft(props: Settled & Pick<ComponentProps<typeof DraftStatus>, "run" |
 function Start({ settle }: Settled) {
   const { id, graph, seq, obstacle, asks, compact, phone } = useEditorSummary();
   const name = graph.name || "untitled";
-  const more = { asks: asks !== "", compact, thumb: phone };
+  const more = { asks: asks !== "" || graph.actions.some(isReadyMade), compact, thumb: phone };
   return <StartControl {...{ graph: id, name, seq, settle, obstacle, ...more }} />;
 }
 

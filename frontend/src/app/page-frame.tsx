@@ -8,6 +8,7 @@ import { useMay } from "../api/people";
 import type { ViewedThing } from "../api/view-links";
 import { MovesNowLine } from "../runs/moves-now";
 import { graphOnScreen } from "../runs/stop/stop-surroundings";
+import { AskedLine } from "../status/asked-line";
 import { Empty } from "../ui/empty";
 import { useStableCallback } from "../ui/hooks";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
@@ -49,6 +50,7 @@ const Sharing = memo(
   lazyPart(() => import("../account/share-dialog").then((part) => part.ShareDialog)),
 );
 const Moving = memo(MovesNowLine);
+const Asking = memo(AskedLine);
 
 const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps) {
   return (
@@ -94,6 +96,7 @@ export function PageBar({ crumbs, status, actions, start, graph, run, at }: Prop
         <>
           {status}
           <Moving />
+          <Asking />
         </>
       }
       actions={

@@ -14,6 +14,7 @@ import { MOVES } from "../api/run-stop";
 import { letGoOn, letStep, type Run, type StepGoal } from "../api/runs";
 import { HoldButton } from "../ui/hold-button";
 import { isolated } from "../words/isolated";
+import { AskedPeople } from "./asked-people";
 import style from "./held-notice.module.css";
 import { actionWords } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
@@ -26,10 +27,16 @@ const NEXT = 3; // buttons of actions that wait
 /** Return whether the simulator plays an action of this robot: nothing moves there. */
 const isPlayed = (robot: string) => robot === "" || robot === SIMULATOR;
 
+/** Who carries out what no robot and no simulator plays. */
+const PERFORMERS: Readonly<Record<string, string>> = {
+  people: "by people",
+  runner: "by the runner",
+};
+
 /** Return an action and its robot in words. */
 function placeWords(run: Run, action: string, robot: string): string {
-  const where = isPlayed(robot) ? "the simulator" : isolated(robot);
-  return `${actionWords(run, action)} on ${where}`;
+  const where = PERFORMERS[robot] ?? `on ${isPlayed(robot) ? "the simulator" : isolated(robot)}`;
+  return `${actionWords(run, action)} ${where}`;
 }
 
 /**
@@ -155,12 +162,13 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
   );
 }
 
-/** Asks people what a run needs from them: to let it go on, and outcomes that nothing shows. */
+/** Asks people what a run needs from them: to let it go on, its questions, and outcomes that nothing shows. */
 export function RunQuestions({ run }: { run: Run }) {
   return (
     <>
       <ServiceNotices run={run} />
       <HeldNotice run={run} />
+      <AskedPeople run={run} />
       <OutcomeQuestions run={run} />
     </>
   );

@@ -5,10 +5,12 @@ import { Link } from "wouter";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay } from "../../api/people";
+import { useEntitled } from "../../api/rights";
 import { type Robot, SIMULATOR } from "../../api/robots";
 import type { Inside } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
 import type { Action } from "../../graph/model";
+import { isReadyMade } from "../../graph/questions";
 import { robotCounts } from "../../graph/robots";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
@@ -17,7 +19,9 @@ import dialogStyle from "./start-dialog.module.css";
 
 type Cast = LedOrder["robots"];
 
-const real = (actions: readonly Action[]) => actions.filter(({ missing }) => !missing);
+/** Return the actions that robots play. */
+const real = (actions: readonly Action[]) =>
+  actions.filter((action) => !action.missing && !isReadyMade(action));
 
 /**
  * Return the actors of a graph, "" (actions that name none) last; empty while its text, or the graphs
@@ -216,6 +220,39 @@ export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps
         </fieldset>
       )}
     </>
+  );
+}
+
+interface PeopleChoiceProps {
+  /** The roles that the graph asks. */
+  roles: readonly string[];
+  people: Readonly<Record<string, string>>;
+  onPeople: (people: Readonly<Record<string, string>>) => void;
+}
+
+/** The choice of who answers for each role. */
+export function PeopleChoice({ roles, people, onPeople }: PeopleChoiceProps) {
+  const known = useEntitled();
+  const options = [...known.groups, ...known.people].map(({ id, name }) => ({
+    value: id,
+    label: isolated(name || "Guest"),
+  }));
+  return (
+    <fieldset className={style.part}>
+      <legend>Who answers</legend>
+      <div className={style.cast}>
+        {roles.map((role) => (
+          <CastRow key={role} actor={role} only={false}>
+            <NativeSelect
+              aria-label={`Who answers for ${isolated(role)}`}
+              value={people[role] ?? ""}
+              data={[{ value: "", label: "Everybody who may run it" }, ...options]}
+              onChange={(event) => onPeople({ ...people, [role]: event.currentTarget.value })}
+            />
+          </CastRow>
+        ))}
+      </div>
+    </fieldset>
   );
 }
 

@@ -25,7 +25,7 @@ interface Props {
   settle: () => Promise<number>;
   /** The reason why this moment cannot be started; null when it can. */
   obstacle: string | null;
-  /** The start asks for values. */
+  /** The start asks for values, or its graph asks people and has to be led: it is looked at first. */
   asks: boolean;
   compact?: boolean;
   /** In two lines, within reach of a thumb. */

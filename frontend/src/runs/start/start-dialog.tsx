@@ -15,8 +15,10 @@ import { useRight } from "../../api/rights";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run, Watching } from "../../api/runs";
 import { runPreflight, type StartFrom, type StartValues } from "../../api/starts";
+import { fromUmrf } from "../../canvas/from-umrf";
 import { type RunBreakpoint, startBreakpoints } from "../../graph/breakpoints";
 import { mapsFrom } from "../../graph/document-keys";
+import { isReadyMade, rolesIn } from "../../graph/questions";
 import { readGraph } from "../../graph/read";
 import { type Beginning, beginningWords } from "../../status/earlier-list";
 import { HelpLink } from "../../status/help-link";
@@ -28,7 +30,15 @@ import { textScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
 import { useAskedValues, ValueList } from "./asked-values";
-import { actorsIn, castObstacle, castOf, LedChoice, movesWords, WayChoice } from "./led-choice";
+import {
+  actorsIn,
+  castObstacle,
+  castOf,
+  LedChoice,
+  movesWords,
+  PeopleChoice,
+  WayChoice,
+} from "./led-choice";
 import { PreflightList } from "./preflight-list";
 import { SecondPerson } from "./second-person";
 import { StartButton } from "./start-button";
@@ -317,16 +327,26 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const [picked, pick] = useState<LedOrder["robots"]>(robots ?? before?.robots ?? {});
   const [lost, setLost] = useState<LedOrder["lost"]>(before?.lost ?? "stop");
   const several = actors.filter((actor) => actor !== "").length > 1;
+  // No engine asks people or waits: such a graph is led.
+  const own = useMemo(
+    () => (text.data ? fromUmrf(JSON.parse(text.data)).actions : []),
+    [text.data],
+  );
+  const asks = own.some(isReadyMade);
+  const roles = useMemo(() => rolesIn(own), [own]);
+  const [answering, setAnswering] = useState<LedOrder["people"]>(before?.people);
+  const people = Object.fromEntries(roles.map((role) => [role, answering?.[role] ?? ""]));
   const [wanted, want] = useState<boolean | null>(chosen.includes(CONDUCTED) ? true : null);
   const mayLead = now.engines.some((robot) => robot.led);
   const waits = (marks.data?.length ?? 0) > 0;
   const continues = beginning?.at.length === 0;
-  const led = continues || (wanted ?? (several || waits));
-  const offered = !continues && (several || waits || led || mayLead);
+  const led = continues || asks || (wanted ?? (several || waits));
+  const offered = !continues && !asks && (several || waits || led || mayLead);
   const cast = castOf(actors, picked, now.engines, may);
-  const missing = led ? castObstacle(actors, cast) : null;
+  const needsNone = actors.length === 0 && asks && graphs !== null;
+  const missing = led && !needsNone ? castObstacle(actors, cast) : null;
   const way = { text, marks, actors, several, led, want, offered };
-  return { ...way, cast, pick, lost, setLost, missing };
+  return { ...way, cast, pick, lost, setLost, missing, roles, people, setAnswering };
 }
 
 export function StartDialog(props: Props) {
@@ -337,7 +357,9 @@ export function StartDialog(props: Props) {
   });
   const way = useWay(props);
   const { led, cast } = way;
-  const order: LedOrder | null = led ? { robots: cast, lost: way.lost } : null;
+  const order: LedOrder | null = led
+    ? { robots: cast, lost: way.lost, ...(way.roles.length > 0 && { people: way.people }) }
+    : null;
   const players = [...new Set(Object.values(cast))].sort();
   const engines = led ? players : whole;
   const asked = led ? (way.missing === null ? [CONDUCTED] : []) : whole;
@@ -452,6 +474,9 @@ export function StartDialog(props: Props) {
         />
       ) : (
         <Where engines={engines} behaviours={behaviours} onToggle={choose} />
+      )}
+      {way.roles.length > 0 && (
+        <PeopleChoice roles={way.roles} people={way.people} onPeople={way.setAnswering} />
       )}
       {choice}
       {begins.part(earlier)}

@@ -1,0 +1,65 @@
+/** Questions that led runs ask people, and the answers. */
+import { useQuery } from "@tanstack/react-query";
+import { runnerAt } from "./client";
+import { fetchAnswer } from "./http";
+import type { Run } from "./run-stop";
+import { sendPress, type Watching } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+export type Question = RunnerApi["QuestionShown"];
+
+/** What a person says: an answer, or why they cannot give one. */
+export type Said = { readonly value: boolean | number | string } | { readonly cannot: string };
+
+/**
+ * Query whether this person may answer each question that waits, by its id. `open`: the ids of those that the page
+ * knows; the query is asked again when they change.
+ */
+export function useMayAnswer(
+  runner: string | undefined,
+  open: readonly string[],
+): ReadonlyMap<string, RunnerApi["WaitingQuestion"]> {
+  const { data } = useQuery({
+    queryKey: ["questions", runner, open.join(" ")],
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/questions", { signal }),
+    enabled: runner !== undefined && open.length > 0,
+    staleTime: 5_000,
+    refetchInterval: 10_000, // batons and rights change
+  });
+  return new Map((data?.questions ?? []).map((each) => [each.question.id, each]));
+}
+
+/** Answer a question. The first answer that is stored counts; robots may begin to move. */
+export function answerQuestion(
+  runner: string,
+  run: string,
+  question: string,
+  said: Said,
+  watching: Watching,
+): Promise<Run> {
+  return sendPress(`answer ${run} ${question} ${JSON.stringify(said)}`, (request) => {
+    const body = { ...said, request_id: request, watching };
+    const path = { run, question };
+    return runnerAt(runner).post("/api/runs/{run}/questions/{question}/answer", { path, body });
+  });
+}
+
+const PHOTO_MS = 60_000; // over the network of a hall
+
+/** Send the photo for a question, and return its id, with which the question is answered. */
+export async function sendPhoto(
+  runner: string,
+  run: string,
+  question: string,
+  photo: Blob,
+): Promise<string> {
+  const place = `runs/${encodeURIComponent(run)}/questions/${encodeURIComponent(question)}`;
+  const request = { method: "POST", body: photo, timeoutMs: PHOTO_MS } as const;
+  const answer = await fetchAnswer(`${runner}/api/${place}/photo`, request);
+  return ((await answer.json()) as RunnerApi["PhotoStored"]).photo;
+}
+
+/** The address of a photo that a person gave as an answer. */
+export function photoUrl(runner: string, run: string, photo: string): string {
+  return `${runner}/api/runs/${encodeURIComponent(run)}/photos/${encodeURIComponent(photo)}`;
+}

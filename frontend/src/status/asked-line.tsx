@@ -1,0 +1,39 @@
+/** One line in the bar of every page: what runs ask people now, with the way there. */
+import { IconMessageQuestion } from "@tabler/icons-react";
+import { Link } from "wouter";
+import { openRuns } from "../api/live-socket";
+import { useLive } from "../api/page-link";
+import { useMayAnswer } from "../api/questions";
+import { isolated } from "../words/isolated";
+import style from "./asked-line.module.css";
+
+export function AskedLine() {
+  const { now, runner } = useLive();
+  const asked = openRuns(now).flatMap((run) =>
+    (run.questions ?? []).map((question) => ({ run, question })),
+  );
+  const known = useMayAnswer(
+    runner,
+    asked.map(({ question }) => question.id),
+  );
+  const mine = asked.filter(({ question }) => known.get(question.id)?.may);
+  const [first] = mine;
+  if (first === undefined) return null;
+  const { run, question } = first;
+  const more = mine.length > 1 ? ` and ${mine.length - 1} more` : "";
+  return (
+    <Link
+      to={`/runs/${run.id}`}
+      className={style.line}
+      role="alert"
+      title={`Run ${run.number} asks: ${question.text}`}
+      aria-label={`Run ${run.number} asks: ${isolated(question.text)}${more}`}
+    >
+      <IconMessageQuestion size={15} aria-hidden />
+      <span className="ellipsis">
+        Asked: {question.text}
+        {more}
+      </span>
+    </Link>
+  );
+}
