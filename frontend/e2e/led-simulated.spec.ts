@@ -79,6 +79,55 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   await expect(waits(page)).toBeHidden();
 });
 
+test("a run asks people, on every page, and their first answer is its outcome", async () => {
+  const { page } = ada;
+  const text = (value: string) => ({ pvf_type: "string", pvf_value: value });
+  const asking = [
+    ["AaConfirm", { question: text("Is the door open?") }],
+    [
+      "AaChoose",
+      {
+        question: text("Which shelf?"),
+        choices: { pvf_type: "strings", pvf_value: ["left", "right"] },
+      },
+    ],
+  ] as const;
+  const names = asking.map(([name]) => ({ name, instance_id: 0 }));
+  const actions = asking.map(([name, input_parameters], i) => ({
+    ...{ name, instance_id: 0, type: "sync", input_parameters },
+    ...{ parents: names.slice(Math.max(0, i - 1), i), children: names.slice(i + 1, i + 2) },
+  }));
+  const ends = { graph_entry: names.slice(0, 1), graph_exit: names.slice(-1) };
+  const body = JSON.stringify({ graph_name: "asking", ...ends, actions });
+  const headers = { "content-type": "application/json" };
+  const { id } = await product.ask<{ id: string }>("/api/graphs", {
+    method: "POST",
+    body,
+    headers,
+  });
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  await page.getByRole("button", { name: /^Run v\d+ in the simulator …/ }).click();
+  await dialog(page)
+    .getByRole("button", { name: /^Run v\d+, step by step, in/ })
+    .click();
+  const asked = page.getByRole("region", { name: /^Question of/ });
+  await expect(asked).toContainText("Is the door open?", { timeout: 15_000 });
+
+  // Whoever is asked sees it on the phone, on another page, and answers there.
+  await page.goto(product.url);
+  await page.setViewportSize({ width: 360, height: 740 });
+  await page.getByRole("link", { name: /asks: .*Is the door open/ }).click();
+  await asked.getByRole("button", { name: "Yes" }).click();
+  await expect(asked).toContainText("Which shelf?");
+  await asked.getByRole("button", { name: "right" }).click();
+  await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("finished");
+  await page.setViewportSize({ width: 1440, height: 900 });
+  const answers = page.getByRole("list", { name: "Answered" });
+  await expect(answers).toContainText(/AaConfirm 0: yes, by .?Ada/);
+  await expect(answers).toContainText(/AaChoose 0: right, by .?Ada/);
+});
+
 test("on the canvas of a run people let it wait at an action and an arrow, and go on until one", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/graphs/${await line("belt", 5)}`);

@@ -4,14 +4,15 @@ import { IconBolt, IconHistory, IconMapOff, IconRobot, IconShare } from "@tabler
 import { memo, type ReactNode, useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
+import { openRuns } from "../api/live-socket";
+import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import type { ViewedThing } from "../api/view-links";
 import { MovesNowLine } from "../runs/moves-now";
 import { graphOnScreen } from "../runs/stop/stop-surroundings";
-import { AskedLine } from "../status/asked-line";
 import { Empty } from "../ui/empty";
 import { useStableCallback } from "../ui/hooks";
-import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { boundedPart, lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
 import style from "./page-frame.module.css";
@@ -50,7 +51,15 @@ const Sharing = memo(
   lazyPart(() => import("../account/share-dialog").then((part) => part.ShareDialog)),
 );
 const Moving = memo(MovesNowLine);
-const Asking = memo(AskedLine);
+const Asked = boundedPart(() => import("../status/asked-line").then((part) => part.AskedLine), {
+  waiting: null,
+});
+
+/** Its code is loaded when a run asks somebody. */
+const Asking = memo(function Asking() {
+  const { now } = useLive();
+  return openRuns(now).some(({ questions }) => questions?.length) ? <Asked /> : null;
+});
 
 const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps) {
   return (

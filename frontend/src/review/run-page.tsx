@@ -17,6 +17,7 @@ import { GraphView } from "../canvas/graph-view";
 import { serverTimeOf } from "../clock/server-clock";
 import { runMarks } from "../graph/breakpoints";
 import type { Key } from "../graph/model";
+import { Answers } from "../status/answers";
 import { RunQuestions } from "../status/held-notice";
 import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
 import { Timeline, type Track } from "../status/lanes/timeline";
@@ -337,6 +338,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
       <main className={style.page}>
         <div className={style.why}>
           <StartedWith run={newest} />
+          <Answers run={newest} />
           <RunQuestions run={newest} />
           {isLedNow && !past && <RunPoint run={newest} graph={level.graph} id={point} />}
           <RestList run={newest} />

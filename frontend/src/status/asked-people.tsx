@@ -1,5 +1,5 @@
 /** Questions of a led run to people: each has a form that says what follows, and by when. */
-import { Button, FileButton, NumberInput, TextInput } from "@mantine/core";
+import { Button, FileButton, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCamera, IconMessageQuestion, IconSend } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
@@ -136,27 +136,37 @@ function TextField(props: FieldProps) {
   );
 }
 
+/** Return the number that a text is, with a point or a comma; null if it is none. */
+export function numberIn(text: string): number | null {
+  const number = Number(text.trim().replace(",", "."));
+  return text.trim() === "" || !Number.isFinite(number) ? null : number;
+}
+
 function NumberField(props: FieldProps) {
   const { at_least: least, at_most: most, text } = props.question;
-  const [value, setValue] = useState<number | string>("");
-  usePendingText(String(value), null);
-  const fits =
-    typeof value === "number" && value >= (least ?? -Infinity) && value <= (most ?? Infinity);
+  const [typed, setTyped] = useState("");
+  usePendingText(typed, null);
+  const value = numberIn(typed);
+  const fits = value !== null && value >= (least ?? -Infinity) && value <= (most ?? Infinity);
   const bounds = [
     least === undefined ? "" : `at least ${least}`,
     most === undefined ? "" : `at most ${most}`,
   ].filter((each) => each !== "");
   return (
     <>
-      <NumberInput
+      <TextInput
         size="xs"
         className={style.reason ?? ""}
-        aria-label={text}
-        placeholder={bounds.join(", ")}
-        hideControls
+        aria-label={[text, ...bounds].join(", ")}
+        placeholder={bounds.join(", ") || "A number"}
         inputMode="decimal"
-        value={value}
-        onChange={setValue}
+        error={
+          typed !== "" && !fits
+            ? `A number${bounds.length > 0 ? ` ${bounds.join(", ")}` : ""}`
+            : null
+        }
+        value={typed}
+        onChange={(event) => setTyped(event.currentTarget.value)}
       />
       <SendButton
         {...props}
@@ -257,10 +267,12 @@ function AnswerForm({ run, question }: { run: Run; question: Question }) {
 
 function Asked({ run, question, why }: { run: Run; question: Question; why: string }) {
   const now = useNow(1000, question.deadline !== undefined || question.lapses_at !== undefined);
-  const action = actionWords(run, question.action);
   const role = question.role ? `${isolated(question.role)} is asked. ` : "";
   return (
-    <section className={style.notice} aria-label={`Question of ${action}`} data-question>
+    <section
+      className={style.notice}
+      aria-label={`Question of ${isolated(actionWords(run, question.action))}`}
+    >
       <IconMessageQuestion size={17} aria-hidden />
       <p>
         <b role="alert">{question.text}</b> {role}

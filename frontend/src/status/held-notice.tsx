@@ -13,14 +13,18 @@ import { SIMULATOR } from "../api/robots";
 import { MOVES } from "../api/run-stop";
 import { letGoOn, letStep, type Run, type StepGoal } from "../api/runs";
 import { HoldButton } from "../ui/hold-button";
+import { boundedPart } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
-import { AskedPeople } from "./asked-people";
 import style from "./held-notice.module.css";
 import { actionWords } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
 import { movingRests } from "./rests";
 import { ServiceNotices } from "./robot-rights";
 import { useWatching, WatchTicks } from "./watching";
+
+const AskedPeople = boundedPart(() => import("./asked-people").then((part) => part.AskedPeople), {
+  waiting: null,
+});
 
 const NEXT = 3; // buttons of actions that wait
 
@@ -168,7 +172,7 @@ export function RunQuestions({ run }: { run: Run }) {
     <>
       <ServiceNotices run={run} />
       <HeldNotice run={run} />
-      <AskedPeople run={run} />
+      {(run.questions?.length || run.pauses?.length) && <AskedPeople run={run} />}
       <OutcomeQuestions run={run} />
     </>
   );

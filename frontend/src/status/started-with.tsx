@@ -7,7 +7,7 @@ export function StartedWith({ run }: { run: Run }) {
   const lines = valueLines(run.values);
   if (lines.length === 0) return null;
   return (
-    <ul className={style.values} aria-label="Started with">
+    <ul className={style.values} aria-label="Started with" data-title="Started with">
       {lines.map(({ place, action, input, text }) => (
         <li key={place}>
           <bdi>{action}</bdi> <bdi>{input}</bdi> ={" "}

@@ -8,6 +8,7 @@ import { silentRests } from "../../api/run-stop";
 import { currentAlarm, type Run } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
+import { Answers } from "../../status/answers";
 import { RunQuestions } from "../../status/held-notice";
 import { type Lane, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
@@ -121,6 +122,7 @@ export function ShownRun(props: ShownRunProps) {
         onLive={() => onSeek(null)}
       />
       {folded !== true && <StartedWith run={run} />}
+      {folded !== true && <Answers run={run} />}
       <RunQuestions run={run} />
       {cursor === null && <RunPoint run={run} graph={sent} id={props.point} />}
       <RobotRests run={run} />
