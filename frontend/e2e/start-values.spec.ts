@@ -171,6 +171,7 @@ test("the list, the run, and the comparison of two say what was set; run again b
   await expect(started).toContainText('Turn valve = "valve_8"');
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
+  await page.getByRole("button", { name: "Show the lanes" }).click();
   await expect(started).toContainText('Turn valve = "ברז"');
   await page.goto(`${product.url}/runs/${first?.id}`);
   await page.getByRole("tab", { name: "Facts" }).click();

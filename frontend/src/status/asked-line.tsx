@@ -22,18 +22,19 @@ export function AskedLine() {
   const { run, question } = first;
   const more = mine.length > 1 ? ` and ${mine.length - 1} more` : "";
   return (
-    <Link
-      to={`/runs/${run.id}`}
-      className={style.line}
-      role="alert"
-      title={`Run ${run.number} asks: ${question.text}`}
-      aria-label={`Run ${run.number} asks: ${isolated(question.text)}${more}`}
-    >
-      <IconMessageQuestion size={15} aria-hidden />
-      <span className="ellipsis">
-        Asked: {question.text}
-        {more}
-      </span>
-    </Link>
+    <span role="alert" className="min-w-0">
+      <Link
+        to={`/runs/${run.id}`}
+        className={style.line}
+        title={`Run ${run.number} asks: ${question.text}`}
+        aria-label={`Run ${run.number} asks: ${isolated(question.text)}${more}`}
+      >
+        <IconMessageQuestion size={15} aria-hidden />
+        <span className="ellipsis">
+          Asked: {question.text}
+          {more}
+        </span>
+      </Link>
+    </span>
   );
 }

@@ -399,7 +399,9 @@ export function StartDialog(props: Props) {
           given.obstacle ??
           watch.obstacle ??
           begins.obstacle(earlier) ??
-          (look.isPlaceholderData ? "Looking …" : obstacleOf(engines, looks, reason)));
+          (look.isPlaceholderData
+            ? "Looking …"
+            : obstacleOf(led ? asked : engines, looks, reason)));
   const choose = (engine: string) => {
     setReason("");
     setDrills(false);
