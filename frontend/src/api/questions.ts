@@ -8,7 +8,7 @@ import type { RunnerApi } from "./schema/runner";
 
 export type Question = RunnerApi["QuestionShown"];
 
-/** What a person says: an answer, or why they cannot give one. */
+/** The words of a person: an answer, or the reason why they cannot give one. */
 export type Said = { readonly value: boolean | number | string } | { readonly cannot: string };
 
 /**

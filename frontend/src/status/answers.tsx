@@ -1,4 +1,4 @@
-/** What people answered in a run, with who and when; nothing for a run that asked nobody. */
+/** Lists the answers of people in a run, with who gave them and when; nothing for a run that asked nobody. */
 import { useLive } from "../api/page-link";
 import { photoUrl } from "../api/questions";
 import type { Run } from "../api/run-stop";

@@ -1,4 +1,4 @@
-/** One line in the bar of every page: what runs ask people now, with the way there. */
+/** The line in the bar of every page with the questions that runs ask now, and a link there. */
 import { IconMessageQuestion } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { openRuns } from "../api/live-socket";

@@ -31,7 +31,7 @@ const NEXT = 3; // buttons of actions that wait
 /** Return whether the simulator plays an action of this robot: nothing moves there. */
 const isPlayed = (robot: string) => robot === "" || robot === SIMULATOR;
 
-/** Who carries out what no robot and no simulator plays. */
+/** The performers of actions that no robot and no simulator plays, in words. */
 const PERFORMERS: Readonly<Record<string, string>> = {
   people: "by people",
   runner: "by the runner",

@@ -177,7 +177,7 @@ export function useOnceIdle(drawn: boolean, work: () => void): void {
   useEffect(() => (drawn ? whenIdle(() => now.current(), LATER_WITHIN) : undefined), [drawn]);
 }
 
-/** What is not seen at first: it is loaded and drawn after what comes first, once the page rests. */
+/** Draws its children, whose code is loaded then, after what comes first, once the page rests. */
 export function Later(props: { drawn: boolean; children: ReactNode }): ReactNode {
   const [isTime, setTime] = useState(false);
   useOnceIdle(props.drawn, () => setTime(true));

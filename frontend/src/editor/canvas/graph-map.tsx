@@ -106,7 +106,7 @@ export function seenArea(view: Viewport, size: { width: number; height: number }
   return { x: -x / zoom, y: -y / zoom, width: size.width / zoom, height: size.height / zoom };
 }
 
-/** How many screens of graph are looked through without a map. */
+/** The size of a graph, in screens, up to which it has no map. */
 const SCREENS = 1.5;
 
 /**

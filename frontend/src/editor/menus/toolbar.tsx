@@ -98,9 +98,9 @@ function AllActionsButton() {
 }
 
 /**
- * What is needed again and again; all else is in the menu at its end. Without a keyboard there is also what
- * only keys would do, and the mode that selects several is shown while it is on. `words`: there is room
- * for words.
+ * The tools that are needed again and again; all others are in the menu at its end. Without a keyboard there are
+ * also those that only keys would replace, and the mode that selects several is shown while it is on. `words`:
+ * there is room for words.
  */
 export const Toolbar = memo(function Toolbar({ words }: { words: boolean }) {
   const { tool, selection } = useEditorContext();
