@@ -1,14 +1,9 @@
 /** The ready-made actions that people answer, or for which the runner waits. */
 
-/** Names by which the runner knows them, and what people call them. */
-export const READY_MADE: ReadonlyMap<string, string> = new Map([
-  ["AaConfirm", "Confirm"],
-  ["AaChoose", "Choose"],
-  ["AaAskText", "Ask for a text"],
-  ["AaAskNumber", "Ask for a number"],
-  ["AaAskPhoto", "Ask for a photo"],
-  ["AaWait", "Wait"],
-  ["AaUntil", "Until a time"],
+/** Names by which the runner knows them. */
+const READY_MADE: ReadonlySet<string> = new Set([
+  ...["AaConfirm", "AaChoose", "AaAskText", "AaAskNumber", "AaAskPhoto"],
+  ...["AaWait", "AaUntil"],
 ]);
 
 const WAITS: ReadonlySet<string> = new Set(["AaWait", "AaUntil"]);
