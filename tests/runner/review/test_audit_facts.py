@@ -27,6 +27,7 @@ from action_assistant.runner.runs.events import (
     StoredKind,
     draft_of,
 )
+from action_assistant.runner.runs.question_events import AnswerRefused, QuestionAnswered
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.caller import Origin, acting_for, stamped
 from action_assistant.web.auth.keys import PersonRef
@@ -84,6 +85,18 @@ LOCK = rights.Lock(PersonRef("ada", "Ada"), 1, "its brake is loose")
             RUN,
             Released(at=1, author=ADA, until="Lift_0"),
             "let the run r1 make steps until Lift_0",
+        ),
+        (
+            RUN,
+            QuestionAnswered(
+                at=1, call=1, node="AaConfirm_0", question="q", by=ADA, outcome="on_true"
+            ),
+            "answered AaConfirm_0 in the run r1",
+        ),
+        (
+            RUN,
+            AnswerRefused(at=1, question="q", node="AaConfirm_0", by=ADA, why="lapsed"),
+            "answered AaConfirm_0 in the run r1 too late",
         ),
         (
             stream_about("r1"),

@@ -47,7 +47,7 @@ LEAST: Final[dict[Permission, tuple[Role, str]]] = {
 #: Routes for people alone, whatever the scopes of a program.
 PERSON_ONLY: Final = re.compile(
     r"(get|post) /api/tokens$|/api/logins/(look|confirm|refuse)|/api/devices|post /api/approvals"
-    r"|post /api/robots/.*/drills|/api/runs/[^/]+/(at_rest|go_on|step|outcome|breakpoints)"
+    r"|post /api/robots/.*/drills|/api/runs/[^/]+/(at_rest|go_on|step|outcome|breakpoints|questions/)"
     r"|/api/tokens/.*/revoke$"
     r"|/api/confirmations|/api/passkeys|/api/mentions"
 )

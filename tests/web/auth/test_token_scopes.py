@@ -47,6 +47,8 @@ FOR_PEOPLE = {
     ("post", "/api/runs/{run}/step"),
     ("put", "/api/runs/{run}/breakpoints"),
     ("post", "/api/runs/{run}/outcome"),
+    ("post", "/api/runs/{run}/questions/{question}/answer"),
+    ("post", "/api/runs/{run}/questions/{question}/photo"),
     ("post", "/api/robots/{name}/drills"),
 }
 #: Paths of which every route is for people, or for links that show one thing.

@@ -69,7 +69,7 @@ class _Body(msgspec.Struct, frozen=True):
     outcome: str = ""
     how: str = ""
     step: str = ""
-    until: str = ""
+    until: str | int = ""  # a number where the runner waits until a time
     name: str = ""
     robot: str = ""
     folder: str = ""
@@ -78,7 +78,7 @@ class _Body(msgspec.Struct, frozen=True):
     saw_it_stop: bool = False
     hardware_stop: bool = False
     holder: _PersonBody | None = None
-    to: _PersonBody | None = None
+    to: _PersonBody | str | None = None  # the id of who is asked, in a question
 
 
 #: What the events say, after the name of the person; fields of the body, and `run`, in braces.
@@ -170,8 +170,12 @@ class RunnerFacts:
                 outcome = _OUTCOMES.get(body.outcome, body.outcome)
                 text = f"said that {body.node} in {{run}} ended {outcome}: {body.reason}"
                 return self._about_run(whole, "starts", text)
+            case "run.question_answered.v1" | "run.answer_refused.v1":
+                late = " too late" if event.kind == "run.answer_refused.v1" else ""
+                text = f"answered {body.node} in {{run}}{late}"
+                return self._about_run(whole, "starts", text)
             case "run.handed_over.v1":
-                to = body.to.name if body.to is not None else ""
+                to = body.to.name if isinstance(body.to, _PersonBody) else ""
                 return self._about_run(whole, "robots", f"handed {{run}} over to {to}")
             case "run.held.v1":
                 if body.by is None:
