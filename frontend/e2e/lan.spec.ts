@@ -151,7 +151,7 @@ test.describe("on plain http", () => {
     await expect(page.getByRole("button", { name: "New graph" })).toHaveCount(0);
     await visit(page, `${lab(product)}/graphs/${graph}`);
     await expect(page.getByText("View only", { exact: true })).toBeVisible({ timeout: 40_000 });
-    await expect(page.getByRole("button", { name: /^Start / })).toHaveCount(0);
+    await expect(page.getByRole("button", { name: /^(Run|Start) v/ })).toHaveCount(0);
     await expect(page.getByRole("button", { name: /^Share/ })).toHaveCount(0);
     await expect(page.getByRole("button", { name: "Add an action" }).first()).toBeDisabled();
 
@@ -175,6 +175,7 @@ test.describe("on plain http", () => {
     await expect(panel.getByRole("button", { name: "Delete this arrow" })).toBeDisabled();
     await panel.getByRole("button", { name: "Wait 1", exact: true }).click();
     await expect(card(page, "Wait", 1)).toHaveClass(/selected/);
+    await page.getByRole("button", { name: "Unfold the list" }).click();
     await page.getByRole("link", { name: /^fetch_tool/ }).click();
     await card(page, "DriveTo")
       .first()
