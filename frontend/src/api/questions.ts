@@ -12,20 +12,21 @@ export type Question = RunnerApi["QuestionShown"];
 export type Said = { readonly value: boolean | number | string } | { readonly cannot: string };
 
 /**
- * Query whether this person may answer each question that waits, by its id. `open`: the ids of those that the page
- * knows; the query is asked again when they change.
+ * Query whether this person may answer each question that waits, by its id; null if the runner does not say. `open`:
+ * the ids of those that the page knows; the query is asked again when they change.
  */
 export function useMayAnswer(
   runner: string | undefined,
   open: readonly string[],
-): ReadonlyMap<string, RunnerApi["WaitingQuestion"]> {
-  const { data } = useQuery({
+): ReadonlyMap<string, RunnerApi["WaitingQuestion"]> | null {
+  const { data, isError } = useQuery({
     queryKey: ["questions", runner, open.join(" ")],
     queryFn: ({ signal }) => runnerAt(runner).get("/api/questions", { signal }),
     enabled: runner !== undefined && open.length > 0,
     staleTime: 5_000,
     refetchInterval: 10_000, // batons and rights change
   });
+  if (isError) return null;
   return new Map((data?.questions ?? []).map((each) => [each.question.id, each]));
 }
 

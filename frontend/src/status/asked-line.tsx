@@ -16,7 +16,7 @@ export function AskedLine() {
     runner,
     asked.map(({ question }) => question.id),
   );
-  const mine = asked.filter(({ question }) => known.get(question.id)?.may);
+  const mine = asked.filter(({ question }) => known === null || known.get(question.id)?.may);
   const [first] = mine;
   if (first === undefined) return null;
   const { run, question } = first;

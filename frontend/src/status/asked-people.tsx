@@ -309,7 +309,8 @@ export function AskedPeople({ run }: { run: Run }) {
   return (
     <>
       {open.map((question) => {
-        const about = known.get(question.id);
+        // Where the runner does not say who may answer, the answer itself is allowed or refused.
+        const about = known === null ? { may: true, why: "" } : known.get(question.id);
         const why = about?.may === false ? about.why || "Others are asked." : "";
         return (
           <Asked

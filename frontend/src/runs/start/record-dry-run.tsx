@@ -28,7 +28,6 @@ export function RecordDryRun({ graph, seq, obstacle, script, values, onStarted }
   const why = now.link === "down" ? "The runner does not answer" : obstacle;
   return (
     <StartButton
-      held={false}
       size="compact-sm"
       icon={<IconPlayerPlayFilled size={12} aria-hidden />}
       label="Run in the simulator"
@@ -37,7 +36,7 @@ export function RecordDryRun({ graph, seq, obstacle, script, values, onStarted }
           ? `Run in the simulator: ${label}, as decided here; it is recorded`
           : `Run in the simulator: ${why}`
       }
-      question=""
+      question={null}
       disabled={why !== null || start.isPending}
       onStart={() =>
         start.mutate(

@@ -4,21 +4,22 @@ import type { ReactNode } from "react";
 import { HoldButton } from "../../ui/hold-button";
 
 interface Props {
-  /** Robots may move, or a second run beside one that goes on would begin. */
-  held: boolean;
   label: ReactNode;
   /** Read out and shown on hover. */
   name: string;
-  /** Asked of who presses a button that is to be held, without holding it. */
-  question: string;
+  /**
+   * The question to a person who presses the button without holding it; null where one press is enough, since
+   * nothing moves and no other run of the graph goes on.
+   */
+  question: string | null;
   disabled: boolean;
   size?: ButtonProps["size"];
   icon?: ReactNode;
   onStart: () => void;
 }
 
-export function StartButton({ held, question, onStart, ...look }: Props) {
-  if (held) return <HoldButton {...look} question={question} onHeld={onStart} />;
+export function StartButton({ question, onStart, ...look }: Props) {
+  if (question !== null) return <HoldButton {...look} question={question} onHeld={onStart} />;
   const { label, name, disabled, size, icon } = look;
   return (
     <Button

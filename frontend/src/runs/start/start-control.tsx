@@ -74,11 +74,14 @@ export function StartControl(props: Props) {
     <span className={style.start} data-thumb={thumb || undefined}>
       {simulated && !asks ? (
         <StartButton
-          held={goes}
           icon={thumb ? undefined : icon}
           label={thumb ? <TwoLines first={first} second="simulator" /> : compact ? first : run}
           name={why === null ? run : `${first}: ${why}`}
-          question={`A run of this graph is going on already. Run ${isolated(label)} beside it, in the simulator?`}
+          question={
+            goes
+              ? `A run of this graph is going on already. Run ${isolated(label)} beside it, in the simulator?`
+              : null
+          }
           disabled={why !== null}
           onStart={() => start.mutate({ seq: settle(), engines: [SIMULATOR], digest: null })}
         />

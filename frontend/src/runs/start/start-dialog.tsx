@@ -561,11 +561,14 @@ export function StartDialog(props: Props) {
           values={values}
         />
         <StartButton
-          held={moves}
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
           label={why ?? (moves ? "Hold to start" : what)}
           name={why === null ? what : `${verb} ${label}: ${why}`}
-          question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(castFor(cast, moving))}` : ""}`}
+          question={
+            moves
+              ? `Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(castFor(cast, moving))}` : ""}`
+              : null
+          }
           disabled={why !== null}
           onStart={begin}
         />
