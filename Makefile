@@ -109,7 +109,7 @@ unit-server: setup ## the tests of the server
 	@echo "» pytest"
 	@# One reads all tests and keeps what pytest makes of them, or each process would make it for itself.
 	@$(KEEPING) $(BIN)/pytest -q --collect-only $(STRUCTURE:%=--ignore=%) $(PYTEST) > /dev/null 2>&1 || true
-	@$(KEEPING) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(STRUCTURE:%=--ignore=%) $(PYTEST)
+	@$(KEEPING) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(STRUCTURE:%=--ignore=%) $(PYTEST)
 
 .PHONY: unit-page
 unit-page: setup ## the tests of the pure parts of the page

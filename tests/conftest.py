@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import httpx
 import pytest
@@ -44,9 +44,20 @@ def _context_once(verify: Any = True, cert: Any = None, trust_env: bool = True) 
 httpx._transports.default.create_ssl_context = _context_once
 
 
+#: Files and folders whose tests are few and long, the longest first: begun last, they would end alone.
+_FIRST: Final = ("tests/web/auth/test_matrix.py", "tests/web/")
+
+
+def _turn(item: pytest.Item) -> int:
+    """Return after how many entries of `_FIRST` a test begins."""
+    found = (n for n, start in enumerate(_FIRST) if item.nodeid.startswith(start))
+    return next(found, len(_FIRST))
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Skip what only `make soak` has time for, and what has its turn on another day, unless its file
-    is named."""
+    """Let long files begin first. Skip what only `make soak` has time for, and what has its turn on
+    another day, unless its file is named."""
+    items.sort(key=_turn)
     if "TEST_LONG" in os.environ:
         return
     files_named = any(".py" in argument for argument in config.args)
