@@ -1,5 +1,6 @@
 """Fixtures for all tests."""
 
+import inspect
 import os
 import ssl
 import subprocess
@@ -42,6 +43,11 @@ def _context_once(verify: Any = True, cert: Any = None, trust_env: bool = True) 
 
 # Each client of httpx would read all certificates of the machine, 30 ms of a processor, also for plain http.
 httpx._transports.default.create_ssl_context = _context_once
+
+# httpx waits 5 s for an answer by itself. Beside seven other processes on two cores a server that works
+# may take longer; one that does not answer at all is found by the time limit of the test.
+_timeout: httpx.Timeout = inspect.signature(httpx.get).parameters["timeout"].default
+_timeout.connect = _timeout.read = _timeout.write = _timeout.pool = 60.0
 
 
 #: Files and folders whose tests are few and long, the longest first: begun last, they would end alone.
