@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from action_assistant import paths
+from action_assistant.umrf.codes import CODES
 
 ROOT: Final = Path(__file__).parents[2]
 SITE: Final = paths.help_site()
@@ -132,6 +133,11 @@ def test_every_route_and_shape_of_both_processes_is_told() -> None:
         }
         assert {each for each in routes if each not in read.text} == set()
         assert {each.lower() for each in spec["components"]["schemas"]} <= read.anchors
+
+
+def test_every_code_of_a_problem_is_told() -> None:
+    told = pages()[SITE / "umrf.html"].text
+    assert [code for code in CODES if code not in told] == []
 
 
 def test_places_that_the_page_leads_to_are_there() -> None:

@@ -1,16 +1,15 @@
-"""The registry of problem codes, the code that reports them, and the documentation."""
+"""The registry of problem codes, and the code that reports them."""
 
 import ast
 from collections.abc import Iterator
 from pathlib import Path
 
 from action_assistant.umrf.check import STRUCTURAL
-from action_assistant.umrf.codes import CODES, table
+from action_assistant.umrf.codes import CODES
 from action_assistant.umrf.fixes import _FIXES
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "server" / "action_assistant" / "umrf"
-DOCUMENT = ROOT / "docs" / "umrf.md"
 
 
 def words() -> Iterator[str]:
@@ -53,7 +52,3 @@ def test_fixes_are_those_that_codes_name() -> None:
 
 def test_structural_codes_are_errors() -> None:
     assert all(CODES[code].severities == ("error",) for code in STRUCTURAL)
-
-
-def test_the_documentation_has_the_table_of_codes() -> None:
-    assert table() in DOCUMENT.read_text()

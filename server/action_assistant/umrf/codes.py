@@ -1,6 +1,6 @@
 """The codes of problems: meaning, severity, consequence and fixes of each.
 
-Checks may report only these; the table in the documentation is made from them.
+Checks may report only these; *Help* makes the tables of its page *UMRF here* from them.
 """
 
 from collections.abc import Iterator
