@@ -24,8 +24,10 @@ from action_assistant.runner.runs.events import (
     StoredKind,
     draft_of,
 )
+from action_assistant.runner.runs.question_events import QuestionAsked
 from action_assistant.runner.start.approvals import ApprovalQuestion, Approvals
 from action_assistant.schema.runner_tables import outbox
+from action_assistant.umrf.questions import Question
 from action_assistant.web.notifications.messages import Message
 from runner.harness import ANN, BEN, EPOCH
 from web.notifications.receiving import webhook
@@ -127,6 +129,17 @@ async def test_a_robot_is_lost_only_while_a_run_is_open_on_it(journal: Journal) 
     await _store(journal, "run/r3", Ended(EPOCH, "stopped"))
     await _store(journal, "robot/Bob", EngineBecame(at=EPOCH + 20 * MINUTE, state="gone"))
     assert len(await _told(journal)) == 1
+
+
+async def test_a_question_to_people_is_told_when_it_is_first_asked(journal: Journal) -> None:
+    door = Question(kind="confirm", text="Is the door open?")
+    first = QuestionAsked(at=EPOCH, call=1, node="a_0", visit=1, question="q1", asks=door)
+    again = msgspec.structs.replace(first, question="q2", again="q1")
+    for run in ("run/r2", "run/r3"):
+        await _store(journal, run, first, again)
+    assert [text for _, text in await _told(journal)] == [
+        "Run 3 of Fetch on David, Bob waits for the answer of a person. Is the door open?"
+    ]
 
 
 async def test_a_run_that_waits_for_a_person_is_told_once(journal: Journal) -> None:

@@ -53,6 +53,21 @@ test("each fact is a sentence, the same as in a mail", () => {
   ]);
 });
 
+test("a question is told once, also when it is asked again", () => {
+  const asking = (id: string) => {
+    const question = { id, action: "AaConfirm_1", visit: 1, text: "Is the door open?" };
+    return noticesOf(
+      live(run({ questions: [question] as NonNullable<Run["questions"]> })),
+      undefined,
+    );
+  };
+  const news = new NewNotices([]);
+  expect(news.take(asking("q1")).map(({ text }) => text)).toEqual([
+    "Run 12 of Fetch on David waits for the answer of a person. Is the door open?",
+  ]);
+  expect(news.take(asking("q2"))).toEqual([]);
+});
+
 test("whatever direction names and reasons of others have ends with them", () => {
   const failed = run({ state: "error", ended_at: at, graph_name: "\u202eA", detail: "\u202eB" });
   expect(textsOf(failed)).toEqual([

@@ -51,6 +51,12 @@ export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): No
       const text = `R${words} waits for a person, who lets it go on or stops it. ${isolated(run.held.why)}`;
       found.push({ key: `run.held:${run.id}:${run.held.since}`, text, path });
     }
+    for (const { action, visit, text: asked } of run.ended_at === null
+      ? (run.questions ?? [])
+      : []) {
+      const text = `R${words} waits for the answer of a person. ${isolated(asked)}`;
+      found.push({ key: `answer.asked:${run.id}:${action}:${visit}`, text, path });
+    }
     for (const robot of run.ended_at === null ? robots : []) {
       const how = LOST[engines.find(({ name }) => name === robot)?.state ?? ""];
       if (how === undefined) continue;

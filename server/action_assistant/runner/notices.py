@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import (
     decode,
 )
 from action_assistant.runner.runs.queries import OPEN
+from action_assistant.runner.runs.question_events import QuestionAsked
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.start.approvals import ApprovalAsked
 from action_assistant.schema.runner_tables import outbox, run
@@ -32,6 +33,7 @@ KINDS: Final = (
     "run.stop_unconfirmed",
     "robot.lost",
     "run.held",
+    "answer.asked",
     "approval.asked",
     "server.fault",
 )
@@ -52,7 +54,11 @@ _HOW: Final = {
 _QUIET_US: Final = 600_000_000
 _QUIET: Final = frozenset({"run.stop_unconfirmed", "robot.lost"})
 _EVENTS: Final = frozenset(
-    each.kind for each in (Ended, AlarmRaised, Held, PieceRest, EngineBecame, ApprovalAsked)
+    each.kind
+    for each in (
+        *(Ended, AlarmRaised, Held, PieceRest),
+        *(QuestionAsked, EngineBecame, ApprovalAsked),
+    )
 )
 
 
@@ -114,6 +120,9 @@ def _of_run(event: Event, receivers: Sequence[Receiver], decoded: RunEvent) -> l
         case PieceRest(asks=True):
             why = f"{decoded.node} on {decoded.engine} has ended, and a person has to say how."
             kind, at, facts = "run.held", decoded.at, {"why": why}
+        # One that nobody answers is asked again each minute.
+        case QuestionAsked(asks=asks, again=""):
+            kind, at, facts = "answer.asked", decoded.at, {"why": asks.text}
         case _:
             return []
     chosen = run.c.id == event.stream.removeprefix(stream_of(""))

@@ -47,6 +47,7 @@ KINDS: Final[Mapping[str, Kind]] = {
     "run.held": Kind(
         f"R{_RUN[1:]} waits for a person, who lets it go on or stops it. {{why}}", "/runs/{run}"
     ),
+    "answer.asked": Kind(f"R{_RUN[1:]} waits for the answer of a person. {{why}}", "/runs/{run}"),
     "approval.asked": Kind(
         "{person} asks a second person to say yes to {graph} for {robot}.", "/graphs/{id}"
     ),
