@@ -124,8 +124,8 @@ for (const scheme of ["light", "dark"] as const) {
     // Under way for as long as the picture takes.
     const run = await begun(page, id, { "*": [BRISK], DriveTo_0: [SLOW] });
     await expect(card(page, "DriveTo").getByText("running")).toBeVisible({ timeout: 20_000 });
-    await whole(page);
     await card(page, "DriveTo").click({ position: { x: 50, y: 30 } });
+    await whole(page); // beside the details
     await picture(page, `editor-${scheme}`);
     await page.getByRole("button", { name: /^Stop run/ }).click();
     await ended(run);
