@@ -293,7 +293,7 @@ test.describe("robots", () => {
     });
   }
 
-  test("on a phone, and one that dies", async ({ browser }) => {
+  test("on a phone, and one that falls silent", async ({ browser }) => {
     const options = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
     const { page, context } = await product.person(browser, "Ada", options);
     await page.goto(`${product.url}/robots`);
@@ -305,7 +305,7 @@ test.describe("robots", () => {
     await expect(begin).toBeEnabled();
     await holdEnter(page, begin);
     await expect(page.getByRole("button", { name: /^Stop run/ })).toBeVisible();
-    await carol.kill();
+    carol.freeze();
     await page.getByRole("button", { name: /^Stop run/ }).tap();
     await expect(page.getByRole("alert")).toContainText("STOP UNCONFIRMED");
     await picture(page, "stop-unconfirmed-phone");

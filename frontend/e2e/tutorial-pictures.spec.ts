@@ -12,7 +12,7 @@ test.describe.configure({ mode: "serial" });
 const FOLDER = resolve(
   process.env.PICTURES_TO ?? resolve(import.meta.dirname, "../../docs/pictures"),
 );
-const SIZE = { viewport: { width: 1280, height: 800 } };
+const SIZE = { viewport: { width: 1280, height: 800 }, panels: "folded" } as const; // as at first
 const product = new Product();
 const david = new StandIn("David");
 let graph = "";
@@ -24,6 +24,7 @@ test.afterAll(async () => {
 });
 
 async function picture(page: Page, name: string): Promise<void> {
+  await page.mouse.move(1, 400); // no hint of a button
   await atRest(page);
   await page.screenshot({ path: resolve(FOLDER, `tutorial-${name}.png`) });
 }
@@ -56,9 +57,11 @@ test("start it, and draw", async ({ browser }) => {
   await page.waitForURL(/\/graphs\/.+/);
   graph = page.url().split("/").at(-1) ?? "";
   await saved(page);
-  const name = page.getByRole("textbox", { name: "Graph", exact: true });
+  await page.getByRole("heading", { level: 1 }).getByRole("button").click();
+  const name = page.getByRole("textbox", { name: "Name of the graph" });
   await name.fill("water_plant");
-  await name.press("F6");
+  await name.press("Enter");
+  await page.locator(".react-flow__pane").click({ position: { x: 300, y: 500 } });
   await page.keyboard.press("a");
   await page.keyboard.type("GoToPlant");
   await page.keyboard.press("Enter");
@@ -81,7 +84,8 @@ test("start it, and draw", async ({ browser }) => {
       "Water_0 > exit",
       "entry > GoToPlant_0",
     ]);
-  await page.keyboard.press("Escape");
+  await page.reload();
+  await saved(page);
   await fitView(page);
   await picture(page, "graph");
   expect(failures).toEqual([]);
@@ -103,8 +107,10 @@ test("try it, run it and stop it in the simulator", async ({ browser }) => {
   await holdNamed(page, /^Run v1 in the simulator/);
   await expect(card(page, "Water").getByText("running")).toBeVisible({ timeout: 20_000 });
   await fitView(page);
+  await page.getByRole("button", { name: "Show the lanes" }).click();
   await picture(page, "run");
   await holdNamed(page, /^Run v1 in the simulator/);
+  await expect(page.getByRole("button", { name: /^Stop run 2/ })).toBeVisible();
   await page.keyboard.press("Control+.");
   await expect(page.getByText(/Run 2: stopped/)).toBeVisible();
   await context.close();
@@ -121,6 +127,7 @@ test("run it on a robot to practise with", async ({ browser }) => {
   await page.goto(`${product.url}/robots`);
   await expect(page.getByText("answers", { exact: true }).first()).toBeVisible({ timeout: 40_000 });
   await expect(page.getByText("A stop can be proven").first()).toBeVisible({ timeout: 40_000 });
+  await expect(page.getByText(/^Looking for engines/)).toHaveCount(0, { timeout: 40_000 });
   await picture(page, "robot");
 
   await page.goto(`${product.url}/graphs/${graph}`);
