@@ -329,6 +329,11 @@ def _runs(walk: Walk) -> None:
     walk("editor", "post", "/api/audit/kept", {"run": run, **around})
     walk("runner", "post", "/api/expectations", {"name": "as before", "run": run})
     walk("runner", "delete", "/api/expectations/{name}", name="as before")
+    repeated = {"start": start_of("repeated", "simulator")}
+    repeat = walk("runner", "post", "/api/repeats", repeated)["id"]
+    walk("runner", "post", "/api/repeats/{repeat}/close", repeat=repeat)
+    walk("runner", "post", "/api/repeats/{repeat}/open", {"closings": 1}, repeat=repeat)
+    walk("runner", "post", "/api/repeats/{repeat}/start", {"cell": 1}, repeat=repeat)
     walk("runner", "post", "/api/stop")
     _view_link(walk, "runner", run)
 

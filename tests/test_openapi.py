@@ -27,6 +27,7 @@ WITHOUT_BODY = frozenset(
         "/api/tokens/{token}/revoke",
         "/api/view-links/{link}/revoke",
         "/api/notifications/{name}/test",
+        "/api/repeats/{repeat}/close",
         "/api/runs/{run}/pause",
         "/api/robots/{name}/stop",
         "/api/robots/{name}/baton/drop",

@@ -40,6 +40,7 @@ from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.notices import KINDS, with_notices
+from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.incident import incident_times
 from action_assistant.runner.review.service import ReviewService
@@ -223,7 +224,11 @@ async def _executing(
                 identity_now=services.identity_now,
                 past=lambda run, is_whole: (own if is_whole else for_people).past(run, is_whole),
             ) as control,
+            Repeats.opened(
+                control, archive_store, clock_us=utc_us, run_in_worker=workers.starts
+            ) as repeats,
         ):
+            services.repeats = repeats
             for_people.recorder_of = own.recorder_of = control.recorder_of
             services.worker_queries, services.control = for_people, control
             services.hub = Hub(control, utc_us, services.requests, services.identity_now)

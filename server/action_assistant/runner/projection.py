@@ -145,6 +145,8 @@ def _first_summary(asked: Requested) -> dict[str, object]:
         summary["unsighted"] = True
     if asked.group is not None:
         summary["group"] = asked.group
+    if asked.repeat is not None:
+        summary["repeat"] = msgspec.to_builtins(asked.repeat)
     if asked.led is not None:
         summary |= {"robots": asked.led.robots, "lost": asked.led.lost}
     if asked.batons:

@@ -49,6 +49,8 @@ FOR_PEOPLE = {
     ("post", "/api/runs/{run}/outcome"),
     ("post", "/api/runs/{run}/questions/{question}/answer"),
     ("post", "/api/runs/{run}/questions/{question}/photo"),
+    ("post", "/api/repeats/{repeat}/start"),
+    ("post", "/api/repeats/{repeat}/open"),
     ("post", "/api/robots/{name}/drills"),
 }
 #: Paths of which every route is for people, or for links that show one thing.

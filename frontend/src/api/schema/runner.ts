@@ -388,6 +388,16 @@ export interface RunnerApi {
         program?: string;
     };
     /**
+     * Axis
+     * @description An input of a grid, by the full name of its action and its flat name, with the values that it gets
+     *     in turn.
+     */
+    Axis: {
+        action: string;
+        name: string;
+        values: (boolean | number | string | (boolean | number | string)[])[];
+    };
+    /**
      * BackupsShown
      * @description The last backup and what it lacks, the failure since then, the last restore rehearsal, and
      *     when the next backup is due. Fields are null where there was none.
@@ -539,6 +549,19 @@ export interface RunnerApi {
         author: RunnerApi["Author"] | null;
     };
     /**
+     * Cell
+     * @description A cell of a repeat, with its run; null until it is started.
+     */
+    Cell: {
+        cell: number;
+        values: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        run: RunnerApi["Listed"] | null;
+    };
+    /**
      * CheckRequest
      * @description A request to check the expected courses of `graph` against the text `umrf`. `subgraphs`: the
      *     graphs inside; if empty, those stored with each expectation are used.
@@ -592,6 +615,19 @@ export interface RunnerApi {
         by?: RunnerApi["Author"];
         value?: boolean | number | string;
         why?: "deadline" | "held" | "lapsed" | "restarted" | "stopped";
+    };
+    /**
+     * ClosedShown
+     * @description The reason why a repeat is closed, in words; `by`: the person who caused it, `run`: the run that did.
+     */
+    ClosedShown: {
+        /** @enum {string} */
+        why: "baton" | "complete" | "looked" | "lost" | "moves" | "person" | "refused" | "restart" | "run" | "stop";
+        text: string;
+        /** Format: date-time */
+        at: string;
+        by: RunnerApi["Author"] | null;
+        run: string | null;
     };
     /**
      * ComparedVisit
@@ -1197,6 +1233,7 @@ export interface RunnerApi {
         };
         questions?: RunnerApi["QuestionShown"][];
         pauses?: RunnerApi["PauseShown"][];
+        repeat?: RunnerApi["PartOfRepeat"];
         cause: string;
         pinned: boolean;
         note: string;
@@ -1315,6 +1352,18 @@ export interface RunnerApi {
         days?: number;
     };
     /**
+     * NextRequest
+     * @description Says that everything is set back, and starts the cell with this number, the next one as the person
+     *     saw it. `watching`: as in `StartRequest`.
+     */
+    NextRequest: {
+        cell: number;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
      * NextShown
      * @description An action (by its full name) that is ready to begin, and its robot.
      */
@@ -1414,6 +1463,14 @@ export interface RunnerApi {
         last: RunnerApi["Confirmation"] | null;
     };
     PageMessage: RunnerApi["StopMessage"];
+    /**
+     * PartOfRepeat
+     * @description The place of a run in a repeat: its id, and the number of the cell, from 1.
+     */
+    PartOfRepeat: {
+        id: string;
+        cell: number;
+    };
     /**
      * Parting
      * @description The earliest visit in which the runs differ, in a sentence, with the messages of the
@@ -1786,6 +1843,93 @@ export interface RunnerApi {
         by: RunnerApi["PersonRef"];
         /** Format: date-time */
         at: string;
+    };
+    /**
+     * ReopenRequest
+     * @description Opens a closed repeat again after a look. `closings`: how often it was closed, as the person saw it;
+     *     `watching`: as in `StartRequest`.
+     */
+    ReopenRequest: {
+        closings: number;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
+     * RepeatRequest
+     * @description Opens a repeat of a start. `times`: how often each cell of the `grid` is carried out, or the start
+     *     itself where there is none. `seed`: the cells of each round come in an order made of it; without one in
+     *     that of the grid. `by_itself`: in the simulator alone, the next run starts when the one before has
+     *     ended true. The `request_id` of the start names the repeat: it is opened once.
+     */
+    RepeatRequest: {
+        start: RunnerApi["StartRequest"];
+        /** @default 1 */
+        times?: number;
+        /** @default [] */
+        grid?: RunnerApi["Axis"][];
+        /** @default null */
+        seed?: number | null;
+        /** @default false */
+        by_itself?: boolean;
+    };
+    /**
+     * RepeatShown
+     * @description A repeat with its cells. `next`: the number of the cell that is started next, null after the last;
+     *     `finished`: how many runs finished; robots report no results, so that nothing else may be known.
+     */
+    RepeatShown: {
+        id: string;
+        graph: string | null;
+        graph_name: string;
+        version: string;
+        digest: string;
+        engine: string;
+        robots: string[];
+        author: RunnerApi["Author"];
+        /** Format: date-time */
+        opened_at: string;
+        times: number;
+        grid: RunnerApi["Axis"][];
+        seed: number | null;
+        by_itself: boolean;
+        total: number;
+        closed: RunnerApi["ClosedShown"] | null;
+        closings: number;
+        reopened_by: RunnerApi["Author"] | null;
+        reopened_at: string | null;
+        /** @enum {string} */
+        state: "between" | "closed" | "running" | "waiting";
+        next: number | null;
+        finished: number;
+        cells: RunnerApi["Cell"][];
+    };
+    /**
+     * RepeatSummary
+     * @description A repeat as lists show it. `robots`: those that may move, none in the simulator; `total`: how many
+     *     runs it has; `closings`: how often it was closed; `reopened_by`: who opened it again last.
+     */
+    RepeatSummary: {
+        id: string;
+        graph: string | null;
+        graph_name: string;
+        version: string;
+        digest: string;
+        engine: string;
+        robots: string[];
+        author: RunnerApi["Author"];
+        /** Format: date-time */
+        opened_at: string;
+        times: number;
+        grid: RunnerApi["Axis"][];
+        seed: number | null;
+        by_itself: boolean;
+        total: number;
+        closed: RunnerApi["ClosedShown"] | null;
+        closings: number;
+        reopened_by: RunnerApi["Author"] | null;
+        reopened_at: string | null;
     };
     /**
      * ReplayFrame
@@ -2193,6 +2337,7 @@ export interface RunnerApi {
         };
         questions?: RunnerApi["QuestionShown"][];
         pauses?: RunnerApi["PauseShown"][];
+        repeat?: RunnerApi["PartOfRepeat"];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2212,7 +2357,7 @@ export interface RunnerApi {
      *     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
      *     them, which was sent, or of the part that was. `from`: where it began, if not at the entry. `people`: who answers
      *     the questions of each actor; `questions`: those that are open; `pauses`: the actions for which the runner
-     *     waits.
+     *     waits; `repeat`: of which repeat it is a cell.
      */
     RunSummary: {
         id: string;
@@ -2265,6 +2410,7 @@ export interface RunnerApi {
         };
         questions?: RunnerApi["QuestionShown"][];
         pauses?: RunnerApi["PauseShown"][];
+        repeat?: RunnerApi["PartOfRepeat"];
     };
     /**
      * RunWhole
@@ -2324,6 +2470,7 @@ export interface RunnerApi {
         };
         questions?: RunnerApi["QuestionShown"][];
         pauses?: RunnerApi["PauseShown"][];
+        repeat?: RunnerApi["PartOfRepeat"];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -3059,6 +3206,25 @@ export interface RunnerPaths {
     "/api/runs/{run}/photos/{photo}": {
         get: RunnerOperations["runPhoto"];
     };
+    "/api/repeats": {
+        get: RunnerOperations["listRepeats"];
+        post: RunnerOperations["openRepeat"];
+    };
+    "/api/repeats/{repeat}": {
+        get: RunnerOperations["getRepeat"];
+    };
+    "/api/repeats/{repeat}/table": {
+        get: RunnerOperations["exportRepeat"];
+    };
+    "/api/repeats/{repeat}/start": {
+        post: RunnerOperations["startCell"];
+    };
+    "/api/repeats/{repeat}/close": {
+        post: RunnerOperations["closeRepeat"];
+    };
+    "/api/repeats/{repeat}/open": {
+        post: RunnerOperations["reopenRepeat"];
+    };
     "/api/labels": {
         get: RunnerOperations["listLabels"];
     };
@@ -3625,6 +3791,124 @@ interface RunnerOperations {
             200: {
                 content: {
                     "image/*": string;
+                };
+            };
+        };
+    };
+    listRepeats: {
+        parameters: {
+            query?: {
+                graph?: string | null;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RepeatSummary"][];
+                };
+            };
+        };
+    };
+    openRepeat: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["RepeatRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RepeatShown"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": RunnerApi["RepeatShown"];
+                };
+            };
+        };
+    };
+    getRepeat: {
+        parameters: {
+            path: {
+                repeat: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RepeatShown"];
+                };
+            };
+        };
+    };
+    exportRepeat: {
+        parameters: {
+            path: {
+                repeat: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "text/csv": string;
+                };
+            };
+        };
+    };
+    startCell: {
+        parameters: {
+            path: {
+                repeat: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["NextRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    closeRepeat: {
+        parameters: {
+            path: {
+                repeat: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RepeatShown"];
+                };
+            };
+        };
+    };
+    reopenRepeat: {
+        parameters: {
+            path: {
+                repeat: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ReopenRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RepeatShown"];
                 };
             };
         };

@@ -98,7 +98,7 @@ def intervals(run: Run) -> bytes:
         )
         moments = (visit.start, visit.until, visit.not_before, visit.not_after)
         shown = ("" if each is None else views.time(each).isoformat() for each in moments)
-        cells = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
+        cells = [plain_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
         row = [*cells, *map(_figure, bounds), missed[name]]
         sheet.writerow(row if run.led is None else [*row, *_led_cells(run, name, number)])
     return text.getvalue().encode()
@@ -107,8 +107,8 @@ def intervals(run: Run) -> bytes:
 def _led_cells(run: Run, name: str, number: int) -> tuple[str, str, str]:
     said = views.words_for(run.said.get(name, ())).get(number)
     answer = answers_by_visit(run.answers.get(name, ())).get(number)
-    people = ("" if each is None else _cell(each.by.name) for each in (said, answer))
-    return (_cell(run.actions[name].robot), next(people), next(people))
+    people = ("" if each is None else plain_cell(each.by.name) for each in (said, answer))
+    return (plain_cell(run.actions[name].robot), next(people), next(people))
 
 
 def _missed(count: VisitCount) -> str:
@@ -119,7 +119,8 @@ def _figure(seconds: float | None) -> str:
     return "" if seconds is None else f"{seconds:.3f}"
 
 
-def _cell(text: str) -> str:
+def plain_cell(text: str) -> str:
+    """Return a text that no spreadsheet takes for a formula."""
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 

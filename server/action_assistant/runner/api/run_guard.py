@@ -43,6 +43,8 @@ FILTERED: Final = frozenset(
             "/api/preflight",
             "/api/asked_inputs",
             "/api/starts/{request_id:str}",
+            "/api/repeats",
+            "/api/repeats/{repeat:str}",
         ),
         *("/api/stop", "/api/robots/{name:str}/stop", "/api/live", "/api/labels"),
         *("/api/comparison", "/api/statistics", "/api/approvals", "/api/approvals/asked"),
@@ -52,6 +54,7 @@ FILTERED: Final = frozenset(
         *("/api/robots/{name:str}/umrf", "/api/robots/{name:str}/recordings/{file:str}"),
         *("/api/robots/{name:str}/rights", "/api/robots/{name:str}/lock"),
         *("/api/robots/{name:str}/unlock", "/api/robots/{name:str}/drills"),
+        *(f"/api/repeats/{{repeat:str}}/{each}" for each in ("table", "start", "close", "open")),
         *(f"/api/robots/{{name:str}}/baton/{each}" for each in ("take", "hand", "drop")),
     }
 )

@@ -12,6 +12,7 @@ from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.photos import Photos
@@ -49,6 +50,7 @@ class RunnerServices:
     released: ReleasedVersions
     notifications: Notifications
     photos: Photos
+    repeats: Repeats
     sight: RunSight
 
     def __init__(self) -> None:

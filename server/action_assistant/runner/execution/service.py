@@ -46,7 +46,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import OF_PEOPLE
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
-from action_assistant.runner.runs.events import Author, Ended
+from action_assistant.runner.runs.events import Author, Ended, PartOfRepeat
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal, whole_of
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
@@ -102,6 +102,7 @@ class ExecutionService:
         self.approvals: Final = Approvals(runtime.journal, runtime.clock_us)
         self._runtime = runtime
         self._robot_watchers: list[Callable[[], None]] = []
+        self._stop_watchers: list[Callable[[Author, str, str], None]] = []
         #: Called with each Stop that found nothing to stop: who pressed it, and for which robot and run.
         self.idle_stop: Callable[[Author, str, str], None] = _ignore_stop
         self._stops = StopOrder()
@@ -198,6 +199,22 @@ class ExecutionService:
         """Call `watcher` with every run that has changed, at once and on the event loop."""
         self._runs.watch(watcher)
 
+    def watch_stops(self, watcher: Callable[[Author, str, str], None]) -> None:
+        """Call `watcher` at once with each Stop that is pressed: who pressed it, the robot and the run that
+        it names; "" for both where it stops everything."""
+        self._stop_watchers.append(watcher)
+
+    def hold_back(self, repeat: str, author: Author) -> None:
+        """Let no start of a repeat leave that was requested before: a Stop was pressed."""
+        self._stops.note(repeat, author)
+
+    def _tell_of_stop(self, author: Author, robot: str, run: str) -> None:
+        for watcher in self._stop_watchers:
+            try:
+                watcher(author, robot, run)
+            except Exception:  # whatever it is: the Stop goes on
+                log.exception("a Stop could not be passed on")
+
     def _remember_sight(self, opened: OpenRun) -> None:
         """Remember who may see a run: its robot may hold its graph long after it is over."""
         if not opened.is_led and self.sight.known(opened.run.id) is None:
@@ -218,14 +235,19 @@ class ExecutionService:
     # --- start --------------------------------------------------------------------------------
 
     async def start(
-        self, request: StartRequest, author: Author, identity: Identity | None = None
+        self,
+        request: StartRequest,
+        author: Author,
+        identity: Identity | None = None,
+        repeat: PartOfRepeat | None = None,
     ) -> Started:
         """Carry out a start, at most once per request id. Return after the one start message was sent.
-        `identity`: that of the author; None for an operator without groups. Raise a subclass of Refused
+        `identity`: that of the author; None for an operator without groups; `repeat`: of which the run
+        is a cell. Raise a subclass of Refused
         if the start is refused; nothing was sent then."""
         starter = identity or operator_of(author)
         self.rights.act(starter)
-        return await self._starts.start(request, author, starter)
+        return await self._starts.start(request, author, starter, repeat)
 
     async def start_group(
         self, group: GroupRequest, author: Author, identity: Identity | None = None
@@ -275,6 +297,7 @@ class ExecutionService:
         and graphs are being stopped, and the robots that cannot be reached. The call never waits.
         `stop_id`: the id of the press, by which a repeated press is recognised."""
         self._stops.note("", author, stop_id)
+        self._tell_of_stop(author, "", "")
         try:
             stopped = self._stop_each(tuple(self.open), author, stop_id)
         finally:
@@ -290,6 +313,7 @@ class ExecutionService:
         Raise NotFound if the robot is not registered."""
         self.robots.engines(name)
         self._stops.note(name, author)
+        self._tell_of_stop(author, name, "")
         try:
             stopped = self._stop_each(tuple(self._runs.on(name)), author, "")
         finally:
@@ -303,6 +327,7 @@ class ExecutionService:
         being stopped; none if all is over. A Stop of a piece stops its whole led run; once that is
         over, a Stop of either reaches the pieces that move again. The call only waits to read a run
         that is not open. Raise NotFound if there is no such run or group."""
+        self._tell_of_stop(author, "", whole_of(run) or run)
         for each in (whole_of(run), run):
             if each in self.open and self._stop(each, author, stop_id):
                 return [each]

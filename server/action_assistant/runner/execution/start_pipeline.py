@@ -33,7 +33,7 @@ from action_assistant.runner.execution.start_checks import (
     kept_for,
 )
 from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
-from action_assistant.runner.runs.events import Author, Led, Requested
+from action_assistant.runner.runs.events import Author, Led, PartOfRepeat, Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import GroupRequest, StartRequest, claim_of
@@ -82,9 +82,16 @@ class StartPipeline:
         self._claims = IdempotentStarts(runtime.journal, runtime.tasks, runtime.clock_us)
         self._turns: dict[str, anyio.Lock] = {}
 
-    async def start(self, request: StartRequest, author: Author, starter: Identity) -> Started:
+    async def start(
+        self,
+        request: StartRequest,
+        author: Author,
+        starter: Identity,
+        repeat: PartOfRepeat | None = None,
+    ) -> Started:
         """Carry out a start of `starter`, at most once per request id. Return after the one start
-        message has left. Raise a subclass of Refused if the start is refused; nothing was sent then."""
+        message has left. `repeat`: of which the run is a cell. Raise a subclass of Refused if the start is
+        refused; nothing was sent then."""
         stops = self._stops.count
         async with self._claims.once(request.request_id):
             known = await self._known(request)
@@ -93,7 +100,9 @@ class StartPipeline:
             await self._checks.require_sight(request, starter)
             async with self.turns(kept_for(request)):
                 accepted = await self._checks.accept(request, starter)
-                run = await self._store_and_hand_over(accepted, author, starter, stops)
+                run = await self._store_and_hand_over(
+                    accepted, author, starter, stops, repeat=repeat
+                )
             return Started(run, fresh=True)
 
     async def start_group(self, group: GroupRequest, author: Author, starter: Identity) -> Grouped:
@@ -155,14 +164,16 @@ class StartPipeline:
         starter: Identity,
         stops: int,
         group: str | None = None,
+        repeat: PartOfRepeat | None = None,
     ) -> Run:
         """Store a start, let its run send the message, wait until it was sent, and return the run.
         `stops`: how many Stops had been pressed when the start was requested; a later one takes
-        effect before anything is sent. `group`: the id of its group, or None. Raise Conflict or
+        effect before anything is sent. `group`: the id of its group, or None; `repeat`: as in `start`. Raise Conflict or
         Unavailable, before anything is sent, if the robot is occupied or the start cannot be
         stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
+        requested = msgspec.structs.replace(requested, repeat=repeat)
         robots = engines_of(accepted.request)
         batons = self._rights.with_baton(robots)
         claim = claim_of(accepted.request, accepted.prepared)
@@ -178,7 +189,8 @@ class StartPipeline:
             opened = self._open(accepted, requested, run, starter)
             if occupied:
                 opened.end("refused", occupied)
-            if pressed := self._stops.since(stops, *engines_of(accepted.request), group or ""):
+            stopped = (*robots, group or "", repeat.id if repeat is not None else "")
+            if pressed := self._stops.since(stops, *stopped):
                 opened.stop(*pressed)
             self._runs.drive(opened, order, accepted.incarnation)
         await opened.published.wait()

@@ -33,7 +33,13 @@ _NEVER: Final = (
     *("run.piece_began.v1", "run.piece_seen.v1", "run.piece_rest.v1", "run.stop_sent.v1"),
     *("run.alarm_raised.v1", "run.modify_refused.v1", "run.summed_up.v1", "run.archived.v1"),
     *("robot.commanded.v1", "robot.engine_became.v1", "robot.stop_proven.v1"),
-    *("robot.stop_unproven.v1", "robot.index_written.v1", "raw.archived.v1", "stream.removed.v1"),
+    *(
+        "repeat.start_kept.v1",
+        "robot.stop_unproven.v1",
+        "robot.index_written.v1",
+        "raw.archived.v1",
+        "stream.removed.v1",
+    ),
 )
 #: Authors that are no people: an arrow of a graph, or the runner itself, stops a step.
 _NOBODY: Final = frozenset({"graph", "runner"})
@@ -64,6 +70,7 @@ class _Body(msgspec.Struct, frozen=True):
     engine: str = ""
     simulated: bool = False
     why: str = ""
+    text: str = ""
     reason: str = ""
     node: str = ""
     outcome: str = ""
@@ -103,6 +110,9 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "robot.rights_set.v1": ("robots", "set who may start on {robot}"),
     "robot.locked.v1": ("robots", "took {robot} out of service: {reason}"),
     "robot.unlocked.v1": ("robots", "put {robot} into service again"),
+    "repeat.opened.v1": ("starts", "opened a repeat of {graph_name}"),
+    "repeat.reopened.v1": ("starts", "opened a repeat again after a look"),
+    "repeat.closed.v1": ("starts", "closed a repeat: {text}"),
     "approval.given.v1": ("starts", "said yes to the graph of a start"),
     "engine.indexes_once.v1": ("robots", "said that the engine of {robot} indexes once: {reason}"),
 }
@@ -174,6 +184,8 @@ class RunnerFacts:
                 late = " too late" if event.kind == "run.answer_refused.v1" else ""
                 text = f"answered {body.node} in {{run}}{late}"
                 return self._about_run(whole, "starts", text)
+            case "repeat.closed.v1" if body.by is None:
+                return None  # the runner closed it by itself
             case "run.handed_over.v1":
                 to = body.to.name if isinstance(body.to, _PersonBody) else ""
                 return self._about_run(whole, "robots", f"handed {{run}} over to {to}")
@@ -262,15 +274,24 @@ def _started(run: str, body: _Body) -> Fact:
 
 def _about_robot(kind: AuditKind, sentence: str, about: str, body: _Body) -> Fact:
     robot = about or body.robot or body.name
+    is_of_graph = "{graph_name}" in sentence
     words = {
         "robot": robot,
         "name": body.name,
         "reason": body.reason,
         "graph": body.graph or "",
+        "graph_name": body.graph_name,
+        "text": body.text,
         "holder": body.holder.name if body.holder is not None else "",
     }
     of_robot = "{robot}" in sentence
-    return Fact(kind=kind, text=sentence.format_map(words), robots=(robot,) if of_robot else ())
+    return Fact(
+        kind=kind,
+        text=sentence.format_map(words),
+        graph=(body.graph or "") if is_of_graph else "",
+        graph_name=body.graph_name if is_of_graph else "",
+        robots=(robot,) if of_robot else (),
+    )
 
 
 def page(wanted: AuditFilter, connection: Connection) -> AuditPage:

@@ -90,6 +90,13 @@ class PieceOf(msgspec.Struct, frozen=True, kw_only=True):
     node: str
 
 
+class PartOfRepeat(msgspec.Struct, frozen=True):
+    """The place of a run in a repeat: its id, and the number of the cell, from 1."""
+
+    id: str
+    cell: int
+
+
 class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A person asked for a start and it was accepted. Stored before anything is sent."""
 
@@ -132,6 +139,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     start_from: StartFrom | None = None  # where it begins, if not at the entry
     earlier: Earlier | None = None  # all that it takes for granted then
     before: Before | None = None  # the course of the run that it continues
+    repeat: PartOfRepeat | None = None  # of which it is a cell
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

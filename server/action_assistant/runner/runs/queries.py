@@ -85,10 +85,37 @@ def of_start(request_id: str) -> Select[Any]:
     return select(run.c.id).where(or_(run.c.request_id == request_id, group)).order_by(run.c.number)
 
 
+def _cells(repeat: str) -> ColumnElement[bool]:
+    """Return the condition of the runs of a repeat, by the ids of their starts."""
+    first = request_of_cell(repeat, "")
+    return and_(run.c.request_id > first, run.c.request_id < f"{first[:-1]}0")
+
+
+def request_of_cell(repeat: str, cell: int | str) -> str:
+    """Return the request id of the one start of a cell."""
+    return f"repeat/{repeat}/{cell}"
+
+
+def of_repeat(repeat: str) -> Select[Any]:
+    """Select id, state and summary of the runs of a repeat, oldest first."""
+    columns = (run.c.id, run.c.state, run.c.summary)
+    return select(*columns).where(_cells(repeat)).order_by(run.c.number)
+
+
+def repeats(but: str, newest: int | None = None) -> Select[Any]:
+    """Select the events of all repeats, the newest first, without those of the kind `but`."""
+    event = runner_event.c
+    chosen = select(event.stream, event.seq, event.kind, event.body).where(
+        event.stream > "repeat/", event.stream < "repeat0", event.kind != but
+    )
+    return chosen.order_by(event.position.desc()).limit(newest)
+
+
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
     """The wanted runs; None in a field means any. `failed`: true for runs that were refused, lost,
     halted, or ended in error; false for other ended runs. `graph`: id or name; `person`: id or
-    part of a name; `text`: part of a name or message; `before`: the id of a run."""
+    part of a name; `text`: part of a name or message; `before`: the id of a run; `repeat`: of which
+    they are cells."""
 
     graph: str | None = None
     engine: str | None = None
@@ -102,6 +129,7 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
     since: int | None = None
     until: int | None = None
     before: str | None = None
+    repeat: str | None = None
 
     @property
     def asks_for_content(self) -> bool:
@@ -176,6 +204,8 @@ def _newest(query: Select[Any], wanted: Filter, limit: int) -> Select[Any]:
 
 
 def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
+    if wanted.repeat is not None:
+        yield _cells(wanted.repeat)
     if wanted.states:
         yield run.c.state.in_([*wanted.states, OPEN])
     if wanted.failed is not None:

@@ -15,6 +15,7 @@ from action_assistant.runner.runs.events import (
     Led,
     Overridden,
     Override,
+    PartOfRepeat,
     PieceOf,
     PieceRest,
 )
@@ -164,6 +165,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     override: Override | None = None
     despite: tuple[Overridden, ...] = ()
     group: str | None = None
+    repeat: PartOfRepeat | None = None
     like: str | None = None
     behaviours: bool = False
     led: Led | None = None  # of a led run
@@ -270,6 +272,13 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         """The reason why no answer of the engine can prove now that the run is at rest; "" if one
         can."""
         return self.unconfirmed or self.loading
+
+    @property
+    def ended_true(self) -> bool:
+        """Return whether the run finished and nothing is known to have failed: robots report no results."""
+        return self.end == "finished" and (
+            self.result == "on_true" or (self.result is None and not self.failed)
+        )
 
     @property
     def active(self) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from action_assistant.runner.runs.events import (
     HeldHow,
     Overridden,
     Override,
+    PartOfRepeat,
 )
 from action_assistant.runner.runs.question_views import (
     AnswerShown,
@@ -88,6 +89,7 @@ _BLANK: Final[dict[str, Any]] = {
     "people": msgspec.UNSET,
     "questions": msgspec.UNSET,
     "pauses": msgspec.UNSET,
+    "repeat": msgspec.UNSET,
     "earlier": None,
     "cause": "",
     "pinned": False,
@@ -216,7 +218,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True, rename={"start_from"
     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
     them, which was sent, or of the part that was. `from`: where it began, if not at the entry. `people`: who answers
     the questions of each actor; `questions`: those that are open; `pauses`: the actions for which the runner
-    waits."""
+    waits; `repeat`: of which repeat it is a cell."""
 
     id: str
     number: int
@@ -257,6 +259,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True, rename={"start_from"
     people: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
     questions: list[QuestionShown] | msgspec.UnsetType = msgspec.UNSET
     pauses: list[PauseShown] | msgspec.UnsetType = msgspec.UNSET
+    repeat: PartOfRepeat | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -444,6 +447,7 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         robots=more.get("robots"),
         batons=tuple(more["batons"]) if "batons" in more else msgspec.UNSET,
         watching=tuple(more["watching"]) if "watching" in more else msgspec.UNSET,
+        repeat=msgspec.convert(more["repeat"], PartOfRepeat) if "repeat" in more else msgspec.UNSET,
         values=msgspec.convert(more["values"], StartValues) if "values" in more else msgspec.UNSET,
         sent_digest=more.get("sent_digest") or msgspec.UNSET,
         start_from=msgspec.convert(more["from"], StartFromShown)
@@ -542,6 +546,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "people": (run.led and run.led.people) or msgspec.UNSET,
         "questions": questions_of(run) or msgspec.UNSET,
         "pauses": pauses_of(run) or msgspec.UNSET,
+        "repeat": run.repeat or msgspec.UNSET,
         "values": run.values or msgspec.UNSET,
         "sent_digest": run.sent_digest or msgspec.UNSET,
         "start_from": msgspec.UNSET

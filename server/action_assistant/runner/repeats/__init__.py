@@ -1,0 +1,1 @@
+"""Repeats: one start, carried out again and again, or with each of several values."""
