@@ -29,6 +29,7 @@ NPM := $(NODE) npm --prefix frontend
 LOCK = $(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
 	--no-annotate --upgrade
 HELP_SOURCES := README.md CONTRIBUTING.md CHANGELOG.md frontend/public/mark.svg server/action_assistant/umrf/codes.py \
+	server/action_assistant/system/diagnostics.py \
 	$(shell find docs frontend/src/api/schema -type f -not -name '*.pyc' 2>/dev/null)
 PAGE_SOURCES := $(shell find frontend/src frontend/public frontend/index.html frontend/vite.config.ts frontend/tsconfig.json -type f 2>/dev/null)
 

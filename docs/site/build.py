@@ -18,13 +18,17 @@ import moves
 import pages
 from sphinx.cmd.build import main as sphinx
 
+from action_assistant.system import diagnostics
 from action_assistant.umrf import codes
 
 HERE: Final = Path(__file__).resolve().parent
 FRONTEND: Final = pages.ROOT / "frontend"
 SCHEMA: Final = FRONTEND / "src/api/schema"
-#: Where a document wants the tables of the codes of problems.
-CODES: Final = "<!-- the tables of codes -->"
+#: Where a document wants a table that is made from the code.
+TABLES: Final = {
+    "<!-- the tables of codes -->": codes.table,
+    "<!-- the table of diagnostics -->": diagnostics.table,
+}
 #: What no page asks for, of the theme and of Sphinx.
 _SPARE: Final = ("*.map", "*.LICENSE.txt", ".buildinfo", "objects.inv", "debug.css", "file.png")
 
@@ -66,8 +70,8 @@ def _completed(place: str, text: str, found: dict[str, str]) -> str:
         records = sorted(each for each in found if each.startswith("decisions/") and each != place)
         lines = [f"- [{pages.numbered(found[each], each)}]({Path(each).name})" for each in records]
         return f"{text}\n\n" + "\n".join(lines)
-    if CODES in text:
-        return text.replace(CODES, codes.table())
+    for mark, table in TABLES.items():
+        text = text.replace(mark, table())
     if pages.LIST in text:
         names = [each for each in pages.section_of(place) if f"{each}.md" in found]
         others = [each for each in names if f"{each}.md" != place]

@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from action_assistant import paths
+from action_assistant.system.diagnostics import CODES as DIAGNOSTICS
 from action_assistant.umrf.codes import CODES
 
 ROOT: Final = Path(__file__).parents[2]
@@ -135,9 +136,10 @@ def test_every_route_and_shape_of_both_processes_is_told() -> None:
         assert {each.lower() for each in spec["components"]["schemas"]} <= read.anchors
 
 
-def test_every_code_of_a_problem_is_told() -> None:
-    told = pages()[SITE / "umrf.html"].text
-    assert [code for code in CODES if code not in told] == []
+def test_every_code_of_problems_and_diagnostics_is_told() -> None:
+    for name, codes in (("umrf", CODES), ("doctor", DIAGNOSTICS)):
+        told = pages()[SITE / f"{name}.html"].text
+        assert [code for code in codes if code not in told] == []
 
 
 def test_places_that_the_page_leads_to_are_there() -> None:
