@@ -57,6 +57,10 @@ test("of two people who want a baton one takes it, and the other sees who has it
   await more(ada.page, /^Who may start here/);
   const form = ada.page.getByRole("dialog");
   await form.getByRole("switch", { name: "It has a baton" }).press("Space");
+  await form.getByRole("button", { name: "Add a limit" }).click();
+  await form.getByRole("textbox", { name: "Parameter" }).fill("torque");
+  await form.getByRole("textbox", { name: "At most" }).fill("60");
+  await form.getByRole("button", { name: "Add a limit" }).scrollIntoViewIfNeeded();
   await picture(ada.page, "form");
   await form.getByRole("button", { name: "Save" }).click();
   for (const { page } of [ada, ben])
@@ -77,6 +81,7 @@ test("the start says who has the baton, and it is taken over there with a reason
   await page.getByRole("checkbox", { name: /^David/ }).check();
   const looks = page.getByRole("list", { name: "Looked at on David" });
   await expect(looks).toContainText("Ada has its baton", { timeout: 30_000 });
+  await expect(looks).toContainText("which the robot does not enforce: torque at most 60");
   await expect(button(page, /A check prevents the start/)).toBeDisabled();
   await picture(page, "start");
   await looks.getByRole("button", { name: "Take it over …" }).click();

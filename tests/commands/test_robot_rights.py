@@ -52,6 +52,14 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
     shown = said("rights", "David", "--watched", "off", "--drill-days", "0", "--baton", "on")
     assert ("watches it" in shown, "30 days" in shown, "released" in shown) == (False, False, True)
     assert "released" not in said("rights", "David", "--released-only", "off", "--baton", "off")
+    shown = said("rights", "David", "--limit", "torque=..60", "--limit", "Grip.arm::force=-5..5")
+    assert "torque at most 60 on David\narm::force of Grip from -5 to 5 on David" in shown
+    assert "torque at most 60" in said("rights", "David", "--watched", "off")  # they stay
+    for wrong in ("torque=60", "=..60", "torque=..much", "torque=..nan"):
+        assert "is no limit" in said("rights", "David", "--limit", wrong, code=1)
+    for wrong, why in (("torque=..", "Say the least or the most"), ("a=2..1", "above its most")):
+        assert why in said("rights", "David", "--limit", wrong, code=1)
+    assert "torque" not in said("rights", "David", "--no-limits")
     assert main(["robots", "drill", "David"]) == 1  # none was ever made
     assert "There is no such run" in said(
         *("drill", "David", "--run", "x", "--saw-it-stop", "yes", "--hardware-stop", "no"), code=1

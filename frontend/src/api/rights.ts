@@ -1,5 +1,6 @@
 /** Rights of robots: who may start there, who holds the baton, and who has put one out of service. */
 import { useQuery } from "@tanstack/react-query";
+import { isolated } from "../words/isolated";
 import { editor, runnerAt } from "./client";
 import { useLive } from "./page-link";
 import { useKnownPeople, usePerson } from "./people";
@@ -10,7 +11,16 @@ import type { RunnerApi } from "./schema/runner";
 /** What the signed-in person may do on a robot. `why`: why they may not start there, "" if they may. */
 export type RobotRight = RunnerApi["RightShown"];
 export type RightsWanted = Required<RunnerApi["RightsWanted"]>;
+export type LimitedTo = RunnerApi["Limit"];
 export type AllowedOperator = RunnerApi["OperatorShown"];
+
+/** Return a limit in words, as "torque of Grip at most 60". */
+export function limitWords({ parameter, action, least, most }: LimitedTo): string {
+  const of = action === "" ? "" : ` of ${isolated(action)}`;
+  const place = isolated(parameter) + of;
+  if (least === null) return `${place} at most ${most}`;
+  return most === null ? `${place} at least ${least}` : `${place} from ${least} to ${most}`;
+}
 
 /** Asks what the signed-in person may do on all robots; asked again when the rights of one change. */
 export function useRights() {

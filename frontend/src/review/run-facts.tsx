@@ -8,6 +8,7 @@ import { useVersions, versionName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { actorWords } from "../api/people";
 import { type RunMarks, setMarks, useLabels, useMarks, useRaw } from "../api/review";
+import { limitWords } from "../api/rights";
 import { type Run, requesterPlace, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { fromWords } from "../status/earlier-list";
@@ -47,6 +48,10 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ...(run.from ? [["Began", fromWords(run.from)] as [string, string]] : []),
     ...(run.values ? [["Started with", valuesWords(run.values)] as [string, string]] : []),
     ...(run.sent_digest ? [["Digest with that", run.sent_digest] as [string, string]] : []),
+    ...Object.entries(run.limits ?? {}).map(([robot, limits]): [string, string] => [
+      "Limits",
+      `${isolated(robot)}: ${limits.map(limitWords).join(", ")}`,
+    ]),
     ["Engine", runPlace(run)],
     ["Started by", `${by}${requesterPlace(run.author)}`],
     ...(run.batons

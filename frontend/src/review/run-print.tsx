@@ -1,6 +1,7 @@
 /** The record of a run on paper: what each action did, when as far as that is known, and who started it. */
 
 import { actorWords } from "../api/people";
+import { limitWords } from "../api/rights";
 import { type Run, requesterPlace, runPlace, type Visit } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
@@ -113,6 +114,10 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
         ...(run.from ? [["Began", fromWords(run.from)] as const] : []),
         ...(run.values ? [["Started with", valuesWords(run.values)] as const] : []),
         ...(run.sent_digest ? [["Digest with that", run.sent_digest] as const] : []),
+        ...Object.entries(run.limits ?? {}).map(
+          ([robot, limits]) =>
+            ["Limits", `${isolated(robot)}: ${limits.map(limitWords).join(", ")}`] as const,
+        ),
         ["Robot", runPlace(run)],
         ["Started by", `${by}${requesterPlace(run.author)}`],
         ["Started", start === null ? "not known to have begun" : moment(start)],

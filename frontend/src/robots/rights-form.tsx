@@ -22,6 +22,7 @@ import { type AllowedOperator, lockRobot, setRights, useEntitled } from "../api/
 import type { Robot } from "../api/robots";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
+import { draftsOf, LimitFields, limitsOf } from "./limit-fields";
 import style from "./rights-form.module.css";
 
 const NOBODY: readonly AllowedOperator[] = [];
@@ -106,6 +107,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
   const [watched, setWatched] = useState(robot.watched);
   const [days, setDays] = useState<number | null>(robot.drill_days);
   const [releasedOnly, setReleasedOnly] = useState(robot.released_only);
+  const [limits, setLimits] = useState(() => draftsOf(robot.limits));
   usePendingText(
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
     null,
@@ -124,6 +126,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
         drill_days: days,
         released_only: releasedOnly,
         ask_again: Number(askAgain) || 0,
+        limits: limitsOf(limits),
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
@@ -206,6 +209,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
             value={askAgain}
             onChange={setAskAgain}
           />
+          <LimitFields drafts={limits} onChange={setLimits} />
           {error !== null && (
             <Text c="var(--error)" role="alert">
               {errorText(error)}

@@ -3,6 +3,7 @@ who holds its baton, and who has put it out of service."""
 
 import argparse
 from datetime import datetime, timedelta
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
@@ -108,6 +109,14 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         help="whoever starts there confirms again after so many minutes that it is they, by another "
         "device or a passkey; 0 for never. Programs cannot start there then",
     )
+    rights.add_argument(
+        "--limit",
+        action="append",
+        metavar="[ACTION.]PARAMETER=[LEAST]..[MOST]",
+        help="numbers that are sent there as this input are in this range, as torque=..60; again for "
+        "each, and all others are dropped",
+    )
+    rights.add_argument("--no-limits", action="store_true", help="drop all limits")
     rights.set_defaults(handler=_rights)
 
 
@@ -225,6 +234,8 @@ def _rights(options: argparse.Namespace) -> int:
         rules = (
             *(options.baton, options.watched, options.released_only, options.drill_days),
             options.ask_again,
+            options.limit,
+            options.no_limits or None,
         )
         if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
@@ -242,6 +253,8 @@ def _rights(options: argparse.Namespace) -> int:
                 else options.drill_days or None,
                 "ask_again": robot.ask_again if options.ask_again is None else options.ask_again,
             }
+            if options.limit or options.no_limits:
+                wanted["limits"] = [_limit(each) for each in options.limit or ()]
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
     print(one_line(f"{robot.name}: {_operators_text(robot)}"))
@@ -264,6 +277,7 @@ def _rules_texts(robot: "Robot") -> list[str]:
         said.append(f"each start on {robot.name} says who watches it")
     if robot.released_only:
         said.append(f"only released versions start on {robot.name}")
+    said += [f"{each.words()} on {robot.name}" for each in robot.limits]
     if robot.drill_days is not None:
         said.append(f"a Stop drill of {robot.name} counts for {robot.drill_days} days")
     return said
@@ -310,6 +324,24 @@ def _operator(asked: str, server: Server) -> dict[str, Any]:
             raise RequestRefused(f"{day!r} is no date; write it as 2027-01-31.") from wrong
         right["until"] = end.astimezone().isoformat()
     return right
+
+
+def _limit(asked: str) -> dict[str, Any]:
+    """Return a limit from [ACTION.]PARAMETER=[LEAST]..[MOST]. Raise RequestRefused if it is none."""
+    place, _, bounds = asked.rpartition("=")
+    action, _, parameter = place.rpartition(".")
+    least, dots, most = bounds.partition("..")
+    try:
+        found = {
+            name: float(text) for name, text in (("least", least), ("most", most)) if text.strip()
+        }
+        if not parameter or not dots or not all(map(isfinite, found.values())):
+            raise ValueError
+    except ValueError as wrong:
+        raise RequestRefused(
+            f"{asked!r} is no limit; write it as torque=..60 or Grip.torque=5..60."
+        ) from wrong
+    return {"parameter": parameter, "action": action, **found}
 
 
 def _names(server: Server) -> dict[str, str]:

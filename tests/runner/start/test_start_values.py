@@ -12,10 +12,12 @@ from action_assistant.commands.remote import values_of
 from action_assistant.errors import BadInput, CannotStart, Conflict
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.views import hidden, run_view
-from action_assistant.runner.start.admission import GroupRequest, order_of
+from action_assistant.runner.start.admission import GroupRequest
 from action_assistant.runner.start.approvals import ApprovalRequest
+from action_assistant.runner.start.orders import order_of
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.limits import Limit
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.start_values import AskedInput
 from runner.execution.test_conductor import Lab, led, shared
@@ -171,21 +173,33 @@ _ORDERS = st.fixed_dictionaries(
 )
 
 
-@given(_ORDERS, _ORDERS, st.frozensets(_NAMES), st.frozensets(_NAMES))
+_LIMITS = st.sampled_from([(), (Limit(parameter="torque", most=60),), (Limit(parameter="torque"),)])
+
+
+@given(_ORDERS, _ORDERS, st.frozensets(_NAMES), st.frozensets(_NAMES), _LIMITS, _LIMITS)
 def test_two_orders_have_one_digest_exactly_if_they_order_the_same(
-    one: dict[str, Any], other: dict[str, Any], codes: frozenset[str], others: frozenset[str]
+    one: dict[str, Any],
+    other: dict[str, Any],
+    codes: frozenset[str],
+    others: frozenset[str],
+    limit: tuple[Limit, ...],
+    bound: tuple[Limit, ...],
 ) -> None:
-    def meant(parts: dict[str, Any], codes: frozenset[str]) -> str:
+    def meant(parts: dict[str, Any], codes: frozenset[str], limits: tuple[Limit, ...]) -> str:
         is_led = parts["engine"] == "conducted"
         more = [parts["robots"], parts["lost"]] if is_led else []
-        return json.dumps([parts["values"], is_led, more, sorted(codes)], sort_keys=True)
+        return json.dumps(
+            [parts["values"], is_led, more, sorted(codes), str(limits)], sort_keys=True
+        )
 
-    def made(parts: dict[str, Any], codes: frozenset[str]) -> str:
-        return order_of(order(sequence(), **parts), "tree", codes)
+    def made(parts: dict[str, Any], codes: frozenset[str], limits: tuple[Limit, ...]) -> str:
+        named = {"David": limits} if limits else {}
+        return order_of(order(sequence(), **parts), "tree", codes, named)
 
-    assert (made(one, codes) == made(other, others)) == (meant(one, codes) == meant(other, others))
-    if meant(one, codes) == meant({**one, "values": {}, "engine": "David"}, frozenset()):
-        assert made(one, codes) == "tree"
+    is_same = meant(one, codes, limit) == meant(other, others, bound)
+    assert (made(one, codes, limit) == made(other, others, bound)) == is_same
+    if meant(one, codes, limit) == meant({**one, "values": {}, "engine": "David"}, frozenset(), ()):
+        assert made(one, codes, limit) == "tree"
 
 
 def test_settings_of_the_command_line_name_one_input_each() -> None:

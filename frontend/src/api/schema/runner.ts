@@ -1178,6 +1178,32 @@ export interface RunnerApi {
         given_up: number;
     };
     /**
+     * Limit
+     * @description The bounds of an input. `parameter`: its flat name, as `arm::torque`, or the end of it after `::`;
+     *     `action`: the name of the action that has it, "" for every action; `least`, `most`: null for no bound.
+     */
+    Limit: {
+        parameter: string;
+        action: string;
+        least: number | null;
+        most: number | null;
+    };
+    /**
+     * LimitWanted
+     * @description The bounds of an input. `parameter`: its flat name, as `arm::torque`, or the end of it after `::`;
+     *     `action`: the name of the action that has it, "" for every action; `least`, `most`: null for no bound,
+     *     but not both.
+     */
+    LimitWanted: {
+        parameter: string;
+        /** @default  */
+        action?: string;
+        /** @default null */
+        least?: number | null;
+        /** @default null */
+        most?: number | null;
+    };
+    /**
      * Listed
      * @description A run of the list, with the marks that people gave it. `cause`: one sentence why it did not
      *     end well, "" if unknown.
@@ -2039,7 +2065,8 @@ export interface RunnerApi {
      *     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
      *     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
      *     `released_only`: only versions start there that an owner has released;
-     *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never.
+     *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
+     *     `limits`: of the numbers that are sent there; where they are missing, they stay as they are.
      */
     RightsWanted: {
         /** @default all */
@@ -2054,6 +2081,7 @@ export interface RunnerApi {
         released_only?: boolean;
         /** @default 0 */
         ask_again?: number;
+        limits?: RunnerApi["LimitWanted"][];
     };
     /**
      * Robot
@@ -2066,7 +2094,8 @@ export interface RunnerApi {
      *     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
      *     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
      *     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
-     *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never.
+     *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
+     *     `limits`: of the numbers that are sent there.
      */
     Robot: {
         name: string;
@@ -2103,6 +2132,7 @@ export interface RunnerApi {
         drills: RunnerApi["DrillShown"][];
         released_only: boolean;
         ask_again: number;
+        limits: RunnerApi["Limit"][];
     };
     /**
      * RobotChange
@@ -2417,7 +2447,8 @@ export interface RunnerApi {
      * @description A run with the graph that was sent. `sent`: the values of its actions, by full name and flat
      *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
      *     `tree_digest`: of the graph together with them, null if the starter did not send it; `earlier`: what
-     *     it takes for granted, null if it began at the entry.
+     *     it takes for granted, null if it began at the entry; `limits`: those of its robots at the start,
+     *     or at the last change of its graph.
      */
     RunWhole: {
         id: string;
@@ -2493,6 +2524,9 @@ export interface RunnerApi {
         subgraphs: RunnerApi["SubgraphShown"][];
         tree_digest: string | null;
         earlier: RunnerApi["EarlierShown"] | null;
+        limits: {
+            [key: string]: RunnerApi["Limit"][];
+        };
     };
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**

@@ -13,7 +13,6 @@ from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, b
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.run_guard import unseen_by
 from action_assistant.runner.api.services import RunnerServices
-from action_assistant.runner.execution.start_checks import engines_of
 from action_assistant.runner.repeats.repeat import (
     MOST,
     NextRequest,
@@ -33,6 +32,7 @@ from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.sight import HIDDEN_GRAPH, Unseen
 from action_assistant.runner.start.admission import decoded
+from action_assistant.runner.start.orders import engines_of
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.auth.access import Needs, identity_of, require

@@ -18,6 +18,8 @@ from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs import views
 from action_assistant.runner.start.drills import DrillRequest
 from action_assistant.safe_text import hold_names
+from action_assistant.umrf.limits import MOST as MOST_LIMITS
+from action_assistant.umrf.limits import Limit
 from action_assistant.web.audit.events import ReleaseTold
 from action_assistant.web.auth.access import Needs, PersonOnly, identity_of
 from action_assistant.web.auth.confirmations import LONGEST_S
@@ -41,12 +43,24 @@ class OperatorWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     until: datetime | None = None
 
 
+class LimitWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The bounds of an input. `parameter`: its flat name, as `arm::torque`, or the end of it after `::`;
+    `action`: the name of the action that has it, "" for every action; `least`, `most`: null for no bound,
+    but not both."""
+
+    parameter: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    action: Annotated[str, msgspec.Meta(max_length=1000)] = ""
+    least: float | None = None
+    most: float | None = None
+
+
 class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
     `released_only`: only versions start there that an owner has released;
-    `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never."""
+    `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
+    `limits`: of the numbers that are sent there; where they are missing, they stay as they are."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
@@ -56,6 +70,9 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     drill_days: Annotated[int, msgspec.Meta(ge=1, le=3650)] | None = None
     released_only: bool = False
     ask_again: Annotated[int, msgspec.Meta(ge=0, le=LONGEST_ASK_AGAIN)] = 0
+    limits: (
+        Annotated[tuple[LimitWanted, ...], msgspec.Meta(max_length=MOST_LIMITS)] | msgspec.UnsetType
+    ) = msgspec.UNSET
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -123,7 +140,8 @@ def _rules(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("share")],
     )
     async def set_rights(name: str, data: RightsWanted, request: _Asking) -> Robot:
-        await services.control.rights.set_rules(name, _rules_of(data), author_of(request))
+        rights = services.control.rights
+        await rights.set_rules(name, _rules_of(data, rights.of(name).rules), author_of(request))
         return services.control.robot_view(name, unseen_by(services, request))
 
     @get(
@@ -297,8 +315,15 @@ def _releases(services: RunnerServices) -> list[ControllerRouterHandler]:
     return [store, drop]
 
 
-def _rules_of(wanted: RightsWanted) -> Rules:
-    """Return the rules that an owner wants. Raise BadInput if somebody stands there twice."""
+def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
+    """Return the rules that an owner wants. Raise BadInput if somebody stands there twice, or a limit
+    limits nothing."""
+    limits = before.limits
+    if wanted.limits is not msgspec.UNSET:
+        limits = tuple(Limit(**msgspec.structs.asdict(each)) for each in wanted.limits)
+    for index, limit in enumerate(limits):
+        if limit.fault:
+            raise BadInput(limit.fault, where={"path": f"/limits/{index}"})
     operators: tuple[Operator, ...] | None = None
     if wanted.operators != "all":
         ids = [each.id for each in wanted.operators]
@@ -312,6 +337,7 @@ def _rules_of(wanted: RightsWanted) -> Rules:
         drill_days=wanted.drill_days,
         released_only=wanted.released_only,
         ask_again=wanted.ask_again,
+        limits=limits,
     )
 
 

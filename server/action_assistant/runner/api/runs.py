@@ -44,7 +44,6 @@ from action_assistant.runner.api.run_guard import (
 )
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
-from action_assistant.runner.execution.start_checks import engines_of
 from action_assistant.runner.review import audit_facts
 from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
@@ -62,6 +61,7 @@ from action_assistant.runner.start.approvals import (
     ApprovalQuestion,
     ApprovalRequest,
 )
+from action_assistant.runner.start.orders import engines_of
 from action_assistant.umrf.semantics import Script
 from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.audit.events import OwnerDid, StartRefused

@@ -14,7 +14,8 @@ from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.observations import ACTIVE
-from action_assistant.runner.links.port import GraphOutline, Order
+from action_assistant.runner.links.port import Answer, GraphOutline, Order
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
     Author,
     Held,
@@ -297,6 +298,22 @@ class Gate:
         """Wait until the gate is open; for ever if it was closed for good."""
         while not self.is_open:
             await self._opened.wait()
+
+
+class Silences:
+    """Remembers of which robots it was told that they do not answer, with their last answer then."""
+
+    def __init__(self, robots: Robots) -> None:
+        self._robots = robots
+        self._told: dict[str, Answer | None] = {}
+
+    def is_told(self, name: str) -> bool:
+        """Return whether this silence of a robot was told before; it is from now on."""
+        robot = self._robots.link(name)
+        answer = robot.answer if robot is not None else None
+        is_told = name in self._told and self._told[name] is answer
+        self._told[name] = answer
+        return is_told
 
 
 class StallWatch:

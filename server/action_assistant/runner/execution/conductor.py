@@ -34,6 +34,7 @@ from action_assistant.runner.execution.conducted_steps import (
     Leading,
     LeftOpen,
     RestNews,
+    Silences,
     StallWatch,
     Step,
     Word,
@@ -90,7 +91,6 @@ from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText
-from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.identity import Identity
 
@@ -182,13 +182,14 @@ class Conductor:
             lambda step: self._finish(step, "on_stopped", "unsent"),
             clock_us,
         )
-        self._silences: dict[str, Answer | None] = {}  # told, with the robot's last answer before
+        self._silences = Silences(robots)
         self._unstored: set[RunRecorder] = set()  # of pieces that have ended
         self._rests = RestNews(lambda event: self._run.tell(event), clock_us)
 
     def leads(self, leading: Leading) -> None:
         """Set the callbacks that record events. Call this once, before the run is driven."""
         self._leading = leading
+        self.gate.stop_run = lambda: leading.stop(RUNNER)
         self._engine.listen(self._hear)
 
     # --- the link -----------------------------------------------------------------------------
@@ -374,12 +375,9 @@ class Conductor:
 
     def _show_begun(self, step: Step) -> None:
         """Show people that a step which people answer, or for which the runner waits, has begun."""
-        if self._played.note_asked(step):
-            self._others[step.node] = "RUNNING"
-            inputs = {name: as_json(value) for name, value in step.call.inputs.items()}
-            at, first = self._clock_us(), self._first
-            began = NodeState(at, first.graph_name, step.node, "RUNNING", inputs)
-            self._subscribers.tell(Transitions(run=first.run, changes=(began,)))
+        if (began := self._played.begin_asked(step)) is not None:
+            self._others[step.node] = began.state
+            self._subscribers.tell(Transitions(run=self._first.run, changes=(began,)))
 
     async def _lead_in_turn(self, step: Step) -> None:
         while True:
@@ -416,9 +414,12 @@ class Conductor:
             return
         robot = self._robots.reachable(step.engine)
         try:
+            self.gate.hold_to_limits(step, self._texts[step.node])
             cleared = await self._look.before_piece(
                 robot, self._first, self.gate.person, self.gate.claim
             )
+        except NotSent:
+            return
         except NotAllowed as why:  # whatever the starter has chosen, this stops nothing
             if not self.gate.is_waiting:
                 self.gate.hold_run(str(why))
@@ -499,6 +500,7 @@ class Conductor:
         if self._stalls.stands_still:
             raise NotSent("the runner stood still before it left")
         cleared.require_still()
+        self.gate.hold_to_limits(step, self._texts[step.node])
 
     def _piece_changed(self, step: Step, piece: OpenRun) -> None:
         """Record what a robot shows of the piece of a step, and act on its end and on faults."""
@@ -634,12 +636,8 @@ class Conductor:
         if code in step.troubles or step.is_stopped or self._stalls.stood_still_since(since):
             return
         step.troubles.add(code)
-        if code == "silent":
-            robot = self._robots.link(step.engine)
-            answer = robot.answer if robot is not None else None
-            is_told = step.engine in self._silences and self._silences[step.engine] is answer
-            self._silences[step.engine] = answer
-            code = "" if is_told else code
+        if code == "silent" and self._silences.is_told(step.engine):
+            code = ""
         self._act_on(why, code and f"led_{code}")
 
     def _act_on(self, why: str, code: str) -> None:

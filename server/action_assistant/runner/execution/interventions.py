@@ -1,6 +1,7 @@
 """Interventions in a run besides Stop: pause, resume, modify, confirm rest; where that is safe."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Final
 
 import msgspec
@@ -24,14 +25,14 @@ from action_assistant.runner.start.admission import (
     Prepared,
     StartRequest,
     Watching,
-    claim_of,
     decoded,
     prepared,
-    watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.orders import claim_of, order_of, watched_in
 from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.limits import Limits
 from action_assistant.web.auth.graph_seals import Sight
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.workers.lanes import RunInWorker
@@ -89,13 +90,14 @@ async def modify(
     approvals: Approvals,
     run_in_worker: RunInWorker,
     require: Callable[[Claim], None],
+    limits: Limits,
     sight: RunSight,
     identity: Identity,
 ) -> Run:
     """Give a running graph another structure, in the name of `author`, and return the run. `body`
     is an encoded ModifyRequest; `engine` is None for a simulated run; `approvals` checks the yes of
     a second person, where the robot demands it; `require` raises a refusal if the author may not
-    start this on its robot; `sight` knows which graphs `identity` and others may see. Raise BadInput if
+    start this on its robot; `limits`: in force on its robot; `sight` knows which graphs `identity` and others may see. Raise BadInput if
     the body is wrong, Forbidden for a graph that the author may not see, Conflict if the run or its
     engine does not allow the change, Unavailable if the message could not be sent, and OutcomeUnknown if
     it cannot be known whether the engine has made the change."""
@@ -116,11 +118,13 @@ async def modify(
     await _require_sight(asked, run, sight, identity)
     facts = SIMULATED if engine is None else engine.facts
     start = _as_start(asked, run)
-    ready = await run_in_worker(prepared, start, facts, run.id)
+    prepare = partial(prepared, limits=limits)
+    ready = await run_in_worker(prepare, start, facts, run.id)
     if sight.has_rules and not run.unsighted:
         _require_own_sight(asked.sight, ready)
     if engine is not None:
-        await approvals.require(engine.registration, ready.digest, author.id)
+        order = order_of(start, ready.digest, (), limits)
+        await approvals.require(engine.registration, order, author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
     _require_moving(opened.run)  # it may have been stopped meanwhile
     if ready.name != run.graph_name:
@@ -130,11 +134,11 @@ async def modify(
         )
     targets = () if run.simulated else (run.engine,)
     graph = GraphOutline(ready.name, ready.actions)
-    order = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
+    message = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
     require(claim_of(start, ready))
     try:
         await opened.modify(
-            author, order, asked.version, ready.digest, asked.continue_from, watching
+            author, message, asked.version, ready.digest, asked.continue_from, watching, limits
         )
     except NotSent as why:
         raise Unavailable(f"The change could not be sent: {why}") from why

@@ -30,8 +30,8 @@ from action_assistant.runner.start.admission import (
     WaitRequest,
     WordRequest,
     pinned_for_text,
-    watched_in,
 )
+from action_assistant.runner.start.orders import watched_in
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import origin_of
@@ -278,6 +278,7 @@ def claim_of(run: Run, watching: tuple[str, ...]) -> Claim:
         watching=frozenset(watching),
         is_drill=run.drill,
         beyond=run.beyond,
+        limits=run.limits if run.led is None else None,
     )
 
 

@@ -21,9 +21,11 @@ from action_assistant.runner.execution.conducted_steps import (
     Tell,
 )
 from action_assistant.runner.execution.led_look import LedLook
+from action_assistant.runner.links.port import NotSent
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.events import (
+    AlarmRaised,
     Author,
     BreakpointsSet,
     HandedOver,
@@ -33,6 +35,7 @@ from action_assistant.runner.runs.events import (
     Released,
     Requested,
 )
+from action_assistant.runner.start.piece_texts import PieceText
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics import Call
@@ -85,6 +88,8 @@ class LedGate(Gate):
         self._due: list[str] = []  # breakpoints that were reached during trouble
         #: Called in the step in which the run is held.
         self.on_hold: Callable[[], None] = _ignore
+        #: Stops the run in the name of the runner.
+        self.stop_run: Callable[[], None] = _ignore
 
     def hold_run(
         self, why: str, by: Author | None = None, *, how: HeldHow = "trouble", node: str = ""
@@ -220,6 +225,17 @@ class LedGate(Gate):
         may."""
         return self._look.why_not_allowed(robot, self.person, self.claim)
 
+    def hold_to_limits(self, step: Step, text: PieceText) -> None:
+        """Hold and stop the run, and raise NotSent, if a value of a piece is outside a limit of its robot
+        now. `text`: of the piece."""
+        over = text.over(self._look.limits_of(step.engine), step.call.inputs)
+        if over is not None:
+            why = over.sentence(step.engine)
+            self.hold_run(why, node=step.node)
+            self._tell(AlarmRaised(self._clock_us(), "led_limit", why))
+            self.stop_run()
+            raise NotSent(why)
+
     def rights_changed(self, robot: str) -> None:
         """Hold the run if the person for whom it is led may begin nothing on a robot any more."""
         if self.person is not None:
@@ -275,4 +291,4 @@ class LedGate(Gate):
 
 
 def _ignore() -> None:
-    """Do nothing: where nobody has to know that the run is held."""
+    """Do nothing: before the run is led."""

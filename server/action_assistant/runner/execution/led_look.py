@@ -24,6 +24,7 @@ from action_assistant.runner.start.led_items import IndexingWords, indexing_item
 from action_assistant.runner.start.preflight import Item, is_blocking
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.umrf.limits import Limit
 from action_assistant.web.auth.identity import Identity
 
 _GET_S: Final = 2.0  # within which a robot has to answer before a piece leaves
@@ -92,6 +93,10 @@ class LedLook:
         name = robot.registration.name
         rights = self._rights.items(name, lead, claim, is_asking=not cleared)
         return [led_item(robot.registration), indexing, *rights]
+
+    def limits_of(self, robot: str) -> tuple[Limit, ...]:
+        """Return the limits in force on a robot now."""
+        return self._rights.limits_of(robot)
 
     def why_not_allowed(
         self, robot: str, lead: Identity | None, claim: Claim, *, is_decided: bool = False

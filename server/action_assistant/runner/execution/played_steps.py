@@ -14,6 +14,7 @@ from action_assistant.runner.execution.led_gate import LedGate
 from action_assistant.runner.links.observations import Exact, NodeResult, NodeState
 from action_assistant.runner.links.port import SIMULATOR, CallPlayed
 from action_assistant.runner.runs.events import PlayBegan, Requested
+from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.semantics import Call
 
 _OVER: Final = frozenset({"FINISHED", "ERROR"})
@@ -54,12 +55,14 @@ class PlayedSteps:
         await self._engine.play(step.call)
         self._gate.passed(step)
 
-    def note_asked(self, step: Step) -> bool:
+    def begin_asked(self, step: Step) -> NodeState | None:
         """Remember that a step which people answer, or for which the runner waits, has begun. Return
-        whether that is news."""
-        is_new = step.call.number not in self._going
+        its state, None if that was known."""
+        is_known = step.call.number in self._going
         self._going[step.call.number] = self._shown[step.node] = step
-        return is_new
+        inputs = {name: as_json(value) for name, value in step.call.inputs.items()}
+        began = NodeState(self._clock_us(), self._graph, step.node, "RUNNING", inputs)
+        return None if is_known else began
 
     def end_asked(self, step: Step) -> None:
         """Remember that a step which people answer, or for which the runner waits, has its outcome."""

@@ -18,7 +18,8 @@ from action_assistant.runner.runs.question_events import ClosedWhy, QuestionAske
 from action_assistant.runner.runs.question_views import WaitingQuestion, question_view
 from action_assistant.runner.runs.run import Closed, Run, answer_press
 from action_assistant.runner.runs.views import time
-from action_assistant.runner.start.admission import Watching, watched_in
+from action_assistant.runner.start.admission import Watching
+from action_assistant.runner.start.orders import watched_in
 from action_assistant.umrf.questions import WrongAnswer
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.roles import allowed

@@ -61,6 +61,7 @@ from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.loading import LoadingTimes
 from action_assistant.runner.stop.proof import SET_GOING, send_stop
 from action_assistant.runner.stop.stop_loop import StopLoop
+from action_assistant.umrf.limits import NO_LIMITS, Limits
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -191,10 +192,11 @@ class OpenRun:
         digest: str,
         continue_from: str,
         watching: tuple[str, ...] = (),
+        limits: Limits = NO_LIMITS,
     ) -> None:
         """Record that `author` gave the run another graph, and send it (`order`) to the engine.
         `version` and `digest`: of the new graph; `continue_from`: the full name of an action to
-        start then, "" for none; `watching`: the robots that they watch. Raise NotSent if it could not be sent, EngineRefused if the engine
+        start then, "" for none; `watching`: the robots that they watch; `limits`: in force on the robot. Raise NotSent if it could not be sent, EngineRefused if the engine
         refuses it, and OutcomeUnknown if it cannot be known whether the engine runs it."""
         asked = ModifyRequested(
             at=self._clock_us(),
@@ -205,6 +207,7 @@ class OpenRun:
             umrf=order.umrf,
             continue_from=continue_from,
             watching=watching,
+            limits=dict(limits),
         )
         self._doubts.reach()
         before = self.run
@@ -219,6 +222,7 @@ class OpenRun:
                     digest=before.digest,
                     actions={name: action.aid for name, action in before.actions.items()},
                     why=str(why),
+                    limits=before.limits,
                 )
             )
             raise

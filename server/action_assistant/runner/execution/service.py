@@ -58,12 +58,12 @@ from action_assistant.runner.start.admission import (
     GroupRequest,
     ResumeRequest,
     StartRequest,
-    watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.drills import DrillRequest, drill_of
 from action_assistant.runner.start.idempotency import StopOrder
 from action_assistant.runner.start.led_items import IndexingWords
+from action_assistant.runner.start.orders import watched_in
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.rights_registry import IdentityNow, RightsRegistry, unchanged
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
@@ -399,6 +399,7 @@ class ExecutionService:
             engine=engine,
             approvals=self.approvals,
             run_in_worker=self._runtime.run_in_worker,
+            limits=self.rights.limits(opened.run.robots),
             require=partial(self._led.require_rights, opened.run, author, identity),
             sight=self.sight,
             identity=by,

@@ -35,12 +35,8 @@ from action_assistant.runner.start.admission import (
     Prepared,
     PreparedPieces,
     StartRequest,
-    claim_of,
-    order_of,
-    overridden_in,
     prepared,
     prepared_pieces,
-    watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.casting import require_not_led
@@ -50,6 +46,13 @@ from action_assistant.runner.start.led_items import (
     led_item,
     led_items,
     with_beginning,
+)
+from action_assistant.runner.start.orders import (
+    claim_of,
+    engines_of,
+    order_of,
+    overridden_in,
+    watched_in,
 )
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.start.rights_registry import (
@@ -131,21 +134,6 @@ class LedStart(msgspec.Struct, frozen=True, kw_only=True):
     engine: LeadableLink
 
 
-def engines_of(request: StartRequest) -> tuple[str, ...]:
-    """Return the names of the robots that a start is for, sorted; none for the simulator."""
-    is_led = bool(request.robots or request.people)
-    named = request.robots.values() if is_led else (request.engine,)
-    return tuple(sorted({*named} - {SIMULATOR}))
-
-
-def kept_for(request: StartRequest) -> tuple[str, ...]:
-    """Return what one start at a time may have: its robots, by name, and the run that it continues, if
-    any. No robot's name has a slash."""
-    since = request.start_from
-    continued = (f"run/{since.run}",) if since is not None and since.continues else ()
-    return (*engines_of(request), *continued)
-
-
 class StartChecks:
     """Decides whether a graph may be started on one engine. Nothing is stored, and an engine is
     only asked for its graphs."""
@@ -215,11 +203,14 @@ class StartChecks:
         watched_in(request.watching, engines_of(request))
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request, earlier)
-        robot = self._robots.reachable(request.engine)
+        robot, limits = (
+            self._robots.reachable(request.engine),
+            self._rights.limits([request.engine]),
+        )
         _require_plain(request)
-        prepare = partial(prepared, earlier=earlier)
+        prepare = partial(prepared, earlier=earlier, limits=limits)
         ready = await self._run_in_worker(prepare, request, robot.facts, random_id())
-        order = order_of(request, ready.tree_digest, overridden_in(request))
+        order = order_of(request, ready.tree_digest, overridden_in(request), limits)
         return await self._accept_on(robot, request, ready, starter, order=order)
 
     def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
@@ -266,12 +257,14 @@ class StartChecks:
         check refuses it."""
         _require_plain(request)
         watched_in(request.watching, engines_of(request))
-        prepare = partial(prepared_pieces, earlier=await self._earlier.read(request, starter))
+        earlier = await self._earlier.read(request, starter)
+        limits = self._rights.limits(engines_of(request))
+        prepare = partial(prepared_pieces, earlier=earlier, limits=limits)
         ready = await self._run_in_worker(prepare, request, CONDUCTED_FACTS, random_id())
         request = msgspec.structs.replace(request, robots=ready.robots, people=ready.people)
         items = (*beginning_items(ready.whole, request.start_from), *led_items(ready))
         overridden = overridden_in(request)
-        order = order_of(request, ready.whole.tree_digest, overridden)
+        order = order_of(request, ready.whole.tree_digest, overridden, limits)
         preflight.require_clear(items, overridden)
         parts = [
             msgspec.structs.replace(request, engine=name, robots={}, people={})
@@ -501,7 +494,8 @@ class StartChecks:
         each robot. `starter`: the person who would start."""
         try:
             earlier = await self._earlier.read(request, starter)
-            prepare = partial(prepared_pieces, approved=False, earlier=earlier)
+            limits = self._rights.limits(engines_of(request))
+            prepare = partial(prepared_pieces, approved=False, earlier=earlier, limits=limits)
             ready = await self._run_in_worker(prepare, request, CONDUCTED_FACTS, "")
         except Refused as refused:
             item = preflight.refusal_item(_code_of(refused), refused)
@@ -545,7 +539,8 @@ class StartChecks:
             return preflight.with_verdict(request.engine, [preflight.refusal_item("link", refused)])
         try:
             earlier = await self._earlier.read(request, starter)
-            prepare = partial(prepared, approved=False, earlier=earlier)
+            limits = self._rights.limits([request.engine])
+            prepare = partial(prepared, approved=False, earlier=earlier, limits=limits)
             ready = await self._run_in_worker(prepare, request, facts, "")
             items.append(preflight.graph_item(ready))
             items += beginning_items(ready, request.start_from)
@@ -592,10 +587,12 @@ class StartChecks:
         what all of them would override."""
         codes = {code for each in looks for code in each.override}
         found: list[Preflight] = []
+        is_led = self.leads(request.engine, request.robots)
         for look in looks:
             is_robot = look.engine not in {SIMULATOR, CONDUCTED} and look.tree_digest
             robot = self._robots.registration(look.engine) if is_robot else None
-            order = order_of(request, look.tree_digest, codes)
+            robots = engines_of(request) if is_led else (look.engine,)
+            order = order_of(request, look.tree_digest, codes, self._rights.limits(robots))
             what = "this graph" if order == look.tree_digest else "this start"
             item = robot and await self._approvals.item(robot, order, starter.person.id, what)
             found.append(look if not item else preflight.with_order(look, item, order))

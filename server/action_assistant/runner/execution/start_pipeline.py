@@ -29,15 +29,14 @@ from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.start_checks import (
     AcceptedStart,
     StartChecks,
-    engines_of,
-    kept_for,
 )
 from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
 from action_assistant.runner.runs.events import Author, Led, PartOfRepeat, Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
-from action_assistant.runner.start.admission import GroupRequest, StartRequest, claim_of
+from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
+from action_assistant.runner.start.orders import claim_of, engines_of, kept_for
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.web.auth.identity import Identity
 
@@ -267,6 +266,7 @@ def _to_store(
         else "",
         beyond=ready.beyond,
         start_from=request.start_from,
+        limits=dict(ready.limits),
         earlier=None if begins is None else begins.earlier,
         before=None if begins is None else begins.before,
     )

@@ -19,7 +19,6 @@ from action_assistant.kit.clock import ClockUs
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.execution.start_checks import engines_of
 from action_assistant.runner.execution.start_pipeline import Started
 from action_assistant.runner.repeats.repeat import (
     ClosedWhy,
@@ -47,7 +46,8 @@ from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, PartOfRepeat, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.start.admission import StartRequest, Watching, watched_in
+from action_assistant.runner.start.admission import StartRequest, Watching
+from action_assistant.runner.start.orders import engines_of, watched_in
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.rights import Denied, may

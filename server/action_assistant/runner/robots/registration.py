@@ -23,6 +23,7 @@ from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, Unseen
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.facts import BadProfile, facts_of
+from action_assistant.umrf.limits import Limit
 from action_assistant.web.auth.keys import PersonRef
 
 #: The stream of all registrations.
@@ -128,7 +129,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
-    `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never.
+    `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
+    `limits`: of the numbers that are sent there.
     """
 
     name: str
@@ -162,6 +164,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     drills: tuple[DrillShown, ...] = ()
     released_only: bool = False
     ask_again: int = 0
+    limits: tuple[Limit, ...] = ()
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -301,4 +304,5 @@ def with_rights(
         drills=tuple(map(drill_view, reversed(rights.drills[-_DRILLS:]))),
         released_only=rules.released_only,
         ask_again=rules.ask_again,
+        limits=rules.limits,
     )

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from action_assistant.errors import Conflict, Forbidden
 from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.events import Author
+from action_assistant.umrf.limits import Limit, Limits, OverLimit
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.rights import Denied, may
@@ -20,7 +21,7 @@ from action_assistant.web.auth.roles import Permission
 
 #: The codes of refusals, which are those of the items of a pre-flight.
 RightCode: TypeAlias = Literal[
-    "service", "right", "baton", "confirm", "watched", "drill", "released"
+    "service", "right", "baton", "confirm", "watched", "drill", "released", "limit"
 ]
 #: Those that concern the person alone, whatever is started.
 OF_PEOPLE: Final[frozenset[RightCode]] = frozenset({"service", "right", "baton", "confirm"})
@@ -46,7 +47,7 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     the robot, with its hardware stop within reach; `ask_again`: minutes after which a person has to
     confirm again that it is they who start, 0 where nobody is asked; `drill_days`: the last Stop drill
     passed, and is so many days old at most; `released_only`: only versions start there that an owner
-    has released."""
+    has released; `limits`: of the numbers that are sent there."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
@@ -54,18 +55,22 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     ask_again: int = 0
     drill_days: int | None = None
     released_only: bool = False
+    limits: tuple[Limit, ...] = ()
 
 
 class Claim(msgspec.Struct, frozen=True, kw_only=True):
     """The part of a start that the rules of robots ask about, apart from its person. `digest`: of the
     graph that is sent together with those inside; `watching`: the robots that a person has said to
     watch; `is_drill`: the start is for a Stop drill, which may be due; `beyond`: it gives values to
-    inputs that the graph does not leave open."""
+    inputs that the graph does not leave open; `limits`: those by robot to which all that is sent was
+    held, with what is `over` them; None where each piece is held to them by itself, as it leaves."""
 
     digest: str
     watching: frozenset[str] = frozenset()
     is_drill: bool = False
     beyond: bool = False
+    limits: Limits | None = None
+    over: tuple[OverLimit, ...] = ()
 
 
 class Holder(msgspec.Struct, frozen=True):
@@ -236,6 +241,19 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
                 return ""
             return f"The last Stop drill of {self.name} was on {_day(drill.stopped_at)}; {asked}."
         return f"No Stop drill of {self.name} has been made; {asked}."
+
+    def over_limit(self, limits: tuple[Limit, ...], claim: Claim) -> Iterator[Refusal]:
+        """Yield why a start may not send what it does. `limits`: those that are in force here."""
+        if claim.limits is None:
+            return
+        if claim.limits.get(self.name, ()) != limits:
+            text = f"The limits of {self.name} have changed since this was checked. Check it again."
+            yield Refusal("limit", text)
+        for each in claim.over[:_NAMED]:
+            yield Refusal("limit", each.sentence(self.name))
+        if len(claim.over) > _NAMED:
+            more = len(claim.over) - _NAMED
+            yield Refusal("limit", f"{more} more values are outside the limits of {self.name}.")
 
     def drill_words(self, drill: Drilled) -> str:
         """Return the sentence that says when a Stop drill was made, by whom, and how it ended."""

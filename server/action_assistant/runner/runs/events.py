@@ -25,6 +25,7 @@ from action_assistant.runner.runs.question_events import (
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.laps import Laps
+from action_assistant.umrf.limits import Limit
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.questions import Asked
 from action_assistant.umrf.start_values import StartValues
@@ -140,6 +141,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     earlier: Earlier | None = None  # all that it takes for granted then
     before: Before | None = None  # the course of the run that it continues
     repeat: PartOfRepeat | None = None  # of which it is a cell
+    limits: dict[str, tuple[Limit, ...]] = {}  # in force on its robots at the start
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -195,6 +197,7 @@ class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=T
     umrf: str  # as sent
     continue_from: str = ""
     watching: tuple[str, ...] = ()
+    limits: dict[str, tuple[Limit, ...]] = {}  # in force on its robot then
 
 
 class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -208,6 +211,7 @@ class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=Tru
     digest: str
     actions: dict[str, str | None]  # full name -> aid
     why: str = ""
+    limits: dict[str, tuple[Limit, ...]] = {}  # to which that version was held
 
 
 class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -622,7 +626,7 @@ def decode(kind: str, body: bytes) -> RunEvent:
 #: Fields of events that are for programs, or too large to be read; people may search all other texts.
 _NOT_SEARCHED: Final = frozenset({
     "actions", "address", "aid", "at", "before", "by", "earlier", "digest", "piece", "graph", "group", "hash", "id", "incarnation", "inner_laps",
-    "laps", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
+    "laps", "limits", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
     "version",
 })  # fmt: skip
 

@@ -371,6 +371,7 @@ def _modified(run: Run, event: ModifyRequested) -> Run:
         version=event.version,
         digest=event.digest,
         tree_digest=None,
+        limits=event.limits,
         actions=run.actions | actions,
         reshaped=True,
     )
@@ -390,6 +391,7 @@ def _unmodified(run: Run, event: ModifyRefused) -> Run:
         run,
         version=event.version,
         digest=event.digest,
+        limits=event.limits,
         actions=actions,
         interventions=kept,
     )

@@ -24,6 +24,7 @@ from action_assistant.runner.runs.visits import ActionRun, Message
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.kept_values import NOTHING_KEPT, KeptValues
 from action_assistant.umrf.laps import Laps
+from action_assistant.umrf.limits import Limit
 from action_assistant.umrf.start_values import StartValues
 
 State: TypeAlias = Literal[
@@ -186,6 +187,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     beyond: bool = False  # they, or the part that is played, are not what the version says
     start_from: StartFrom | None = None  # where it begins, if not at the entry
     earlier: Earlier | None = None  # all that it takes for granted then
+    limits: dict[str, tuple[Limit, ...]] = {}  # in force on its robots at its start, or last change
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

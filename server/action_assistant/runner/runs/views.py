@@ -43,6 +43,7 @@ from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.json.text import UmrfGraph
+from action_assistant.umrf.limits import Limit
 from action_assistant.umrf.start_values import StartValues
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
@@ -312,7 +313,8 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     """A run with the graph that was sent. `sent`: the values of its actions, by full name and flat
     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
     `tree_digest`: of the graph together with them, null if the starter did not send it; `earlier`: what
-    it takes for granted, null if it began at the entry."""
+    it takes for granted, null if it began at the entry; `limits`: those of its robots at the start,
+    or at the last change of its graph."""
 
     umrf: UmrfGraph
     override: Override | None
@@ -322,6 +324,7 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     subgraphs: list[SubgraphShown]
     tree_digest: str | None
     earlier: EarlierShown | None = None
+    limits: dict[str, tuple[Limit, ...]] = {}
 
 
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -420,6 +423,7 @@ def whole_view(
         subgraphs=subgraphs_shown(graph),
         tree_digest=graph.tree_digest,
         earlier=None if run.earlier is None else earlier_view(run.earlier, run.start_from),
+        limits=run.limits,
     )
 
 

@@ -1,19 +1,17 @@
 """The requests of starts, and the rules that a start has to satisfy before it is stored or sent.
 Pure."""
 
-import hashlib
+import itertools
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
+from typing import Annotated, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
-import rfc8785
 
 from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.links.simulator import slowed
-from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.earlier import StartFrom
 from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.runs.sent_graphs import (
@@ -41,7 +39,7 @@ from action_assistant.umrf.checks.actors import led_problems
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.text import pointer
+from action_assistant.umrf.kept_values import receiving, value_arrows
 from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.led_steps import as_one_step
 from action_assistant.umrf.led_subgraphs import (
@@ -50,6 +48,15 @@ from action_assistant.umrf.led_subgraphs import (
     graphs_within,
     players,
     subgraph_obstacles,
+)
+from action_assistant.umrf.limits import (
+    NO_LIMITS,
+    Limit,
+    LimitedInputs,
+    Limits,
+    OverLimit,
+    inputs_of,
+    over_limits,
 )
 from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.pieces import Obstacle, handed_by, obstacles, piece_name
@@ -290,7 +297,8 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
     `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one; `handing`:
     the arrows by which these hand values to others. `digest`, `tree_digest`: of the version;
-    `sent_digest`, `beyond`, `beginning`: as of `Admitted`, the last without its graph."""
+    `sent_digest`, `beyond`, `beginning`: as of `Admitted`, the last without its graph. `limits`: those
+    in force on its robots, to which all of it was held; `over`: what is outside of them."""
 
     run: str
     name: str
@@ -310,16 +318,8 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     sent_digest: str = ""
     beyond: bool = False
     beginning: Beginning | None = None
-
-
-def watched_in(watching: Watching, robots: Collection[str]) -> tuple[str, ...]:
-    """Return the robots that a person watches, sorted. Raise BadInput for one that is not in
-    `robots`."""
-    for name in watching:
-        if name not in robots:
-            where: dict[str, object] = {"path": pointer("watching", name)}
-            raise BadInput(f"Nothing of this moves {name}.", where=where)
-    return tuple(sorted(name for name, is_watched in watching.items() if is_watched))
+    limits: Limits = {}
+    over: tuple[OverLimit, ...] = ()
 
 
 def read_request(body: bytes) -> StartRequest:
@@ -406,9 +406,11 @@ def prepared(
     *,
     approved: bool = True,
     earlier: EarlierRun | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> Prepared:
     """Admit a start and write the text that will be sent as this run. For workers: it takes long
-    with large graphs. Raises what `admit` raises. `earlier`: as of `admit`."""
+    with large graphs. Raises what `admit` raises. `earlier`: as of `admit`; `limits`: in force on the
+    robot that gets all of it."""
     admitted = admit(request, facts, approved=approved, earlier=earlier)
     graph = admitted.graph
     inside = [action for each in admitted.inside.values() for action in each.actions]
@@ -432,7 +434,13 @@ def prepared(
         beyond=admitted.beyond,
         beginning=admitted.beginning
         and msgspec.structs.replace(admitted.beginning, graph=Graph(name=graph.name)),
+        limits=limits,
+        over=_over(limits.get(request.engine, ()), inputs_of(graph, admitted.inside)),
     )
+
+
+def _over(limits: Sequence[Limit], inputs: LimitedInputs) -> tuple[OverLimit, ...]:
+    return tuple(itertools.islice(over_limits(limits, inputs), _MOST_SHOWN))
 
 
 def _beginning(
@@ -555,43 +563,6 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     asked: dict[str, Asked] = {}
 
 
-def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
-    """Return what a start brings to the rules of robots. `ready`: None for a graph that is refused
-    anyway."""
-    return Claim(
-        digest="" if ready is None else ready.tree_digest,
-        watching=frozenset(name for name, is_watched in request.watching.items() if is_watched),
-        is_drill=request.drill,
-        beyond=ready is not None and ready.beyond,
-    )
-
-
-def order_of(request: StartRequest, tree_digest: str, codes: Collection[str]) -> str:
-    """Return the digest of everything that a second person says yes to: the version (`tree_digest`), and
-    where there are any, the values, the robots of a led run with what happens when one is lost, the
-    overridden `codes`, and where it begins: the record of an earlier run, which is over, does not
-    change. That of a start with nothing besides its graph is the tree digest."""
-    more: dict[str, Any] = {}
-    if request.values:
-        more["values"] = msgspec.to_builtins(request.values)
-    if request.engine == CONDUCTED:
-        more |= {"robots": request.robots, "lost": request.lost}
-    if request.people:
-        more["people"] = request.people
-    if codes:
-        more["override"] = sorted(set(codes))
-    if request.start_from is not None:
-        more["from"] = msgspec.to_builtins(request.start_from)
-    if not more:
-        return tree_digest
-    return hashlib.sha256(rfc8785.dumps([tree_digest, more])).hexdigest()
-
-
-def overridden_in(request: StartRequest) -> tuple[str, ...]:
-    """Return the codes of the problems that a start overrides."""
-    return request.override.codes if request.override is not None else ()
-
-
 def prepared_pieces(
     request: StartRequest,
     facts: EngineFacts,
@@ -599,11 +570,13 @@ def prepared_pieces(
     *,
     approved: bool = True,
     earlier: EarlierRun | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> PreparedPieces:
     """Admit the start of a led run and write the texts of its pieces. For workers. Raises what
     `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for a
-    graph that cannot run as pieces. `earlier`: as of `admit`."""
+    graph that cannot run as pieces. `earlier`: as of `admit`; `limits`: in force on its robots."""
     whole = prepared(request, facts, run, approved=approved, earlier=earlier)
+    whole = msgspec.structs.replace(whole, limits=limits)
     graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
     for_robots = without_asked(graph)
     actors = actors_in(for_robots, inside)
@@ -684,6 +657,14 @@ def _part_of(
         subgraphs=tuple(each for each in whole.subgraphs if each.name in within),
         is_led=True,
         handing=handed_by(graph, {each.key for each in actions}),
+        over=_over(
+            whole.limits.get(robot, ()),
+            inputs_of(
+                msgspec.structs.replace(graph, actions=tuple(actions)),
+                {name: inside[name] for name in sorted(within)},
+                receiving(graph, tuple(value_arrows(graph))),
+            ),
+        ),
     )
 
 

@@ -21,6 +21,14 @@ from action_assistant.umrf.kept_values import (
     with_keepers,
 )
 from action_assistant.umrf.led_subgraphs import Inside, graphs_within
+from action_assistant.umrf.limits import (
+    Limit,
+    LimitedInputs,
+    OverLimit,
+    inputs_of,
+    over_limits,
+    with_received,
+)
 from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.pieces import piece_name, piece_of
@@ -33,7 +41,7 @@ class PieceText(msgspec.Struct, frozen=True, kw_only=True):
 
     `inputs`: the leaves that get a value for each call, by flat name, as JSON without one; in the text
     their `marks` stand. `is_taken`: some arrow hands the outputs on; `taken_on_false`: also after
-    false.
+    false. `limited`: the inputs that have the same value for each call, for the limits of the robot.
     """
 
     parts: tuple[str, ...]
@@ -45,6 +53,15 @@ class PieceText(msgspec.Struct, frozen=True, kw_only=True):
     marks: dict[str, str] = {}
     is_taken: bool = False
     taken_on_false: bool = False
+    limited: LimitedInputs = {}
+
+    def over(self, limits: Sequence[Limit], values: Mapping[str, Any]) -> OverLimit | None:
+        """Return what is outside of these limits with the values that `for_run` takes; None if nothing
+        is."""
+        if not limits:
+            return None
+        sent = with_received(self.limited, self.action, values, self.inputs)
+        return next(over_limits(limits, sent), None)
 
     def kept_parts(self) -> tuple[str, ...]:
         """Return the parts of the text in which keepers (actions that hold values and never run)
@@ -103,6 +120,9 @@ def texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, Piec
             marks=marks,
             is_taken=action.key in taken,
             taken_on_false=action.key in on_false,
+            limited=inputs_of(
+                Graph(name=graph.name, actions=(action,)), own, {action.key: leaves.keys()}
+            ),
         )
     return texts
 

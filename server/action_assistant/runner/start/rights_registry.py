@@ -34,6 +34,7 @@ from action_assistant.runner.robots.rights import (
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.preflight import Item, Verdict
+from action_assistant.umrf.limits import Limit, Limits
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Person, PersonRef
 from action_assistant.web.auth.released_versions import Release
@@ -46,6 +47,7 @@ GONE_S: Final = 1800.0
 _POLL_S: Final = 1.0  # between two looks at the sessions of holders
 _STORE_S: Final = 5.0
 _SHORTEST_REASON: Final = 3
+_NAMED: Final = 6  # limits in one sentence
 
 #: Returns an identity as it is now, with the role and groups that count; None if it was ended.
 IdentityNow = Callable[[Identity], Identity | None]
@@ -150,11 +152,22 @@ class RightsRegistry:
         rules = (record.decided.rules, record.stored.rules)
         if claim is not None and any(each.released_only for each in rules):
             found += self._not_released(robot, claim)
+        if claim is not None:
+            found += tuple(record.decided.over_limit(self.limits_of(robot), claim))
         if found or is_decided or record.stored is record.decided:
             return found
         pending = tuple(record.stored.refusals(current, now, claim=claim, is_asking=is_asking))
         text = f"The rights of {robot} are just changing, and that is not stored yet. Try it again."
         return tuple(Refusal(each.code, text) for each in pending[:1])
+
+    def limits_of(self, robot: str) -> tuple[Limit, ...]:
+        """Return the limits in force on a robot: also those that are just being taken away."""
+        record = self._record(robot)
+        return tuple(dict.fromkeys(record.decided.rules.limits + record.stored.rules.limits))
+
+    def limits(self, robots: Iterable[str]) -> Limits:
+        """Return the limits in force on these robots; robots without any are left out."""
+        return {name: found for name in robots if (found := self.limits_of(name))}
 
     def _not_released(self, robot: str, claim: Claim) -> tuple[Refusal, ...]:
         """Return why a robot that takes released versions only takes no graph with this digest; empty
@@ -244,6 +257,12 @@ class RightsRegistry:
             by = "an owner" if release is None else release.by.name or "an owner"
             text = f"This version was released by {by}."
             found.append(Item(code="released", verdict="passed", text=text))
+        limits = self.limits_of(robot)
+        if limits and claim.limits is not None and "limit" not in blocked:
+            said = ", ".join(each.words() for each in limits[:_NAMED])
+            more = f" and {len(limits) - _NAMED} more" if len(limits) > _NAMED else ""
+            text = f"Within the limits of {robot}, which the robot does not enforce: {said}{more}."
+            found.append(Item(code="limit", verdict="passed", text=text))
         if "drill" not in blocked:
             found += self._drill_items(robot, claim)
         return tuple(found)
