@@ -23,8 +23,10 @@ pytest.importorskip(
 )
 
 from action_assistant.errors import Conflict
+from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.umrf.kept_values import KEEPER_PACKAGE
+from action_assistant.umrf.limits import Limit
 from action_assistant.umrf.model import Graph, Parameter
 from ros.generated_packages import Workspace, graph_of
 from ros.led_engines import ALWAYS, Engines, as_led, ends_of, going_round, led_round, over
@@ -212,6 +214,30 @@ def test_an_output_that_is_not_set_is_told_and_hands_nothing_on(engines: Engines
     own = {name: value for name, (_, value) in GIVEN.items()}
     assert got[1] == own
     assert got[3] == own
+
+
+def test_a_number_outside_a_limit_reaches_no_code_and_stops_the_run(engines: Engines) -> None:
+    loop = going_round(passing("limited", {}, {"result": "on_false"}))
+    limited = Rules(limits=(Limit(parameter="count", most=20),))
+
+    async def main() -> tuple[str, set[str]]:
+        async with engines.led() as (control, journal):
+            for name in engines.names:
+                await control.rights.set_rules(name, limited, ANN)
+            run = (await control.start(as_led(loop), ANN)).run.id
+            end = await over(control, run, 60)
+            sys.stdout.write(f"\n{journal.history(run).alarms[-1].text}\n")
+            return end, alarms(journal)
+
+    assert anyio.run(main) == ("stopped", {"led_limit"})
+    told = truth(engines)
+    gave, got = (
+        [each["values"]["count"] for each in told if each["event"] == what]
+        for what in ("gave", "got")
+    )
+    sys.stdout.write(f"the code got {got}, and gave {gave[-1]} at last\n")
+    assert len(got) > 3
+    assert max(got) <= 20 < gave[-1]
 
 
 def test_a_robot_without_the_package_is_refused_with_the_arrow(

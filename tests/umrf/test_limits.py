@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.umrf.limits import Limit, inputs_of, over_limits
+from action_assistant.umrf.limits import Limit, extremes, inputs_of, over_limits
 from action_assistant.umrf.model import ENTRY, Graph, Parameter, Remap
 from runner.harness import sequence
 
@@ -80,6 +80,35 @@ def test_numbers_are_inside_exactly_if_each_is_finite_and_within_both_bounds(
     is_in = all(math.isfinite(each) and least <= each <= most for each in members)
     found = sentences(task(Parameter("torque", spelled)), limit)
     assert (found == []) == is_in
+
+
+_VALUES = st.floats(-9, 9) | st.lists(st.floats(), max_size=2) | st.just("high")
+_BOUNDS = st.floats(-9, 9) | st.none()
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(["Grip", "Push"]), st.booleans(), _VALUES), max_size=6),
+    st.sampled_from(["", "Grip"]),
+    _BOUNDS,
+    _BOUNDS,
+)
+def test_of_extremes_one_is_outside_exactly_if_one_of_all_is(
+    given_: list[tuple[str, bool, Any]], action: str, least: float | None, most: float | None
+) -> None:
+    limit = Limit(parameter="torque", action=action, least=least, most=most)
+    line = sequence("task", len(given_) or 1)
+    actions = tuple(
+        msgspec.structs.replace(
+            each,
+            name=name,
+            inputs=(parameter("arm/torque" if is_deep else "torque", "number", value),),
+        )
+        for each, (name, is_deep, value) in zip(line.actions, given_, strict=False)
+    )
+    inputs = inputs_of(msgspec.structs.replace(line, actions=actions), {})
+    few = extremes(inputs)
+    assert bool(list(over_limits([limit], few))) == bool(list(over_limits([limit], inputs)))
+    assert sum(map(len, few.values())) <= 2 * 2 * 4
 
 
 def test_a_limit_counts_for_its_action_and_for_names_that_end_so() -> None:

@@ -45,8 +45,9 @@ class Limit(msgspec.Struct, frozen=True, kw_only=True):
 
     def covers(self, action: str, name: str) -> bool:
         """Return whether this limits the input with a flat name of an action with this name."""
-        is_named = name == self.parameter or name.endswith(f"::{self.parameter}")
-        return is_named and self.action in {"", action}
+        if self.action not in ("", action):
+            return False
+        return name == self.parameter or name.endswith(f"::{self.parameter}")
 
     def words(self) -> str:
         """Return the limit in words: "torque of Grip at most 60"."""
@@ -128,6 +129,30 @@ def inputs_of(
         for _, each in _inputs(inside[name], is_inside=True):
             found.setdefault(_last(each.name), []).append(each)
     return {name: tuple(inputs) for name, inputs in found.items()}
+
+
+def extremes(inputs: LimitedInputs) -> LimitedInputs:
+    """Return few of these inputs, of which one is outside a limit exactly if one of all is: those of one
+    name and action with the least and greatest numbers, and one that has others."""
+    found: dict[str, tuple[LimitedInput, ...]] = {}
+    for last, alike in inputs.items():
+        groups: dict[tuple[object, ...], LimitedInput] = {}
+        for each in alike:
+            place = (each.action, each.name, each.is_brought, each.from_outside)
+            numbers = each.numbers
+            if numbers is None or not all(map(isfinite, numbers)):
+                groups.setdefault((*place, "no number"), each)
+            elif numbers:
+                least = groups.setdefault((*place, "least"), each).numbers or ()
+                most = groups.setdefault((*place, "most"), each).numbers or ()
+                if min(numbers) < min(least):
+                    groups[*place, "least"] = each
+                if max(numbers) > max(most):
+                    groups[*place, "most"] = each
+            else:
+                groups.setdefault((*place, "empty"), each)
+        found[last] = tuple(dict.fromkeys(groups.values()))
+    return found
 
 
 def with_received(

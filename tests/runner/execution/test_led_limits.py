@@ -4,16 +4,25 @@ import random
 from typing import Any
 
 import anyio
+import msgspec
 import pytest
 
 from action_assistant.errors import Refused
+from action_assistant.runner.execution.question_commands import AnswerRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Held, StopRequested
+from action_assistant.runner.runs.views import time
+from action_assistant.runner.start.admission import GoOnRequest
 from action_assistant.umrf.limits import Limit
+from action_assistant.umrf.model import Remap
+from runner.execution.test_conducted_subgraphs import TASK, sent
 from runner.execution.test_conducted_values import Lab, parameter, relay
+from runner.execution.test_conductor import Lab as Plain
 from runner.execution.test_conductor import led
+from runner.execution.test_questions import asked_of, asking, line, open_question
 from runner.harness import ANN, ended, until, virtual
+from umrf.test_limits import task
 
 TORQUE = parameter("torque", "number")
 TORQUES = parameter("torque", "numbers")
@@ -124,10 +133,65 @@ async def test_no_value_outside_a_limit_ever_leaves() -> None:
                 await limit(control, robot, rules)
                 set_at[robot] = before
             end = await ended(control, run)
-        sent = {
+        left = {
             "Carol": [values[0]] * len(lab.carol.starts),
             "David": [0.0, *[values[1]] * (len(lab.david.starts) - 1)],
         }
-        late = {name: sent[name][int(set_at[name]) :] for name in sent}
+        late = {name: left[name][int(set_at[name]) :] for name in left}
         assert all(each <= most for each in [*late["Carol"], *late["David"]]), seed
         assert end in {"finished", "stopped"}
+
+
+@virtual
+async def test_an_answer_outside_a_limit_stops_the_run_before_its_action() -> None:
+    ask = asking("AaAskNumber", question="Which torque?")
+    graph = line(ask, "Scout")
+    asked, work = graph.actions
+    work = msgspec.structs.replace(work, inputs=(TORQUE,))
+    renamed = tuple(
+        msgspec.structs.replace(each, remap=(Remap("number", "torque"),))
+        if each.child == work.key
+        else each
+        for each in graph.relations
+    )
+    graph = msgspec.structs.replace(graph, actions=(asked, work), relations=renamed)
+    for answer, end in ((80, "stopped"), (60, "finished")):
+        lab = Lab({"*": [{"after_s": 1}]})
+        async with lab.runner(graph) as control:
+            await limit(control, "David")
+            run = (await control.start(asked_of(graph), ANN)).run.id
+            question = (await open_question(control, run)).question
+            await control.questions.answer(run, question, AnswerRequest(value=answer), ANN)
+            assert await ended(control, run) == end
+            assert len(lab.david.starts) == (end == "finished")
+
+
+@virtual
+async def test_after_a_restart_of_the_runner_pieces_are_held_to_the_limits() -> None:
+    lab = Lab(giving(80) | {"Do0_0": [{"after_s": 5, "outputs": {"torque": 80}}]})
+    async with lab.runner(GRAPH) as control:
+        await limit(control, "Carol")
+        run = (await control.start(led(GRAPH), ANN)).run.id
+        await until(lambda: control.open[run].run.actions["Do0_0"].state == "RUNNING")
+    async with lab.runner(GRAPH) as control:
+        await until(lambda: control.open[run].run.actions["Do0_0"].state == "FINISHED")
+        held = control.open[run].run.held
+        assert held is not None
+        await control.go_on(run, GoOnRequest(time(held.at)), ANN)
+        assert await ended(control, run) == "stopped"
+    assert [each.code for each in lab.harness.journal.history(run).alarms][-1] == "led_limit"
+    assert lab.carol.starts == []
+
+
+@virtual
+async def test_a_graph_inside_of_a_piece_is_held_to_the_limits() -> None:
+    inner = msgspec.structs.replace(task(parameter("torque", "number", 61)), name="Pick")
+    lab = Plain({"*": [{"after_s": 1}]})
+    async with lab.runner() as control:
+        await limit(control, "Carol")
+        await limit(control, "David", Rules(limits=(Limit(parameter="torque", most=61),)))
+        run = (await control.start(sent(TASK, inner), ANN)).run.id  # David plays it
+        assert await ended(control, run) == "finished"
+        await limit(control, "David")
+        with pytest.raises(Refused, match="David would get 61 as torque of Grip_0"):
+            await control.start(sent(TASK, inner), ANN)

@@ -44,7 +44,7 @@ LOCK = rights.Lock(PersonRef("ada", "Ada"), 1, "its brake is loose")
         (
             ROBOT,
             rights.RightsSet(at=1, author=ADA, rules=rights.Rules(baton=True)),
-            "set who may start on Carrier",
+            "set the rules of Carrier",
         ),
         (
             ROBOT,

@@ -13,9 +13,11 @@ from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.start.approvals import ApprovalRequest
 from action_assistant.umrf.facts import SECOND_PERSON
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.limits import Limit
-from runner.harness import Harness, order, until, virtual
-from runner.registered_robots import group
+from action_assistant.umrf.model import Action
+from runner.harness import Harness, order, sequence, until, virtual
+from runner.registered_robots import NEVER, Open, change, fleet, group
 from runner.start.test_rights_registry import ANN, OLGA, author, david, lab
 from umrf.test_limits import parameter, task
 
@@ -100,3 +102,37 @@ async def test_a_second_person_says_yes_to_the_limits_too() -> None:
         await control.rights.set_rules("David", LIMITED, OLGA)
         await control.start(order(LOW, engine="David"), author(ANN), ANN)
         await until(lambda: len(robot.starts) == 1)
+
+
+class Pausing(Open):
+    """A robot on which pausing is safe."""
+
+    pauses = True
+
+
+@virtual
+async def test_another_version_and_a_resume_are_held_to_the_limits_of_that_moment() -> None:
+    robot = Pausing(NEVER)
+    async with fleet(Harness(), David=robot) as control:
+        await control.rights.set_rules("David", LIMITED, OLGA)
+        run = (await control.start(order(sequence(), engine="David"), author(ANN))).run
+        robot.texts = {run.graph_name: codec.write(sequence())}
+        await until(lambda: control.open[run.id].run.state == "running")
+        high = msgspec.structs.replace(
+            sequence(), actions=tuple(replaced(each) for each in sequence().actions)
+        )
+        with pytest.raises(Refused, match="David would get 80 as torque of Work_0"):
+            await control.modify(run.id, change(high), author(ANN))
+        await control.pause(run.id, author(ANN))
+        await control.rights.set_rules("David", Rules(), OLGA)
+        with pytest.raises(Conflict, match="limits of David have changed since"):
+            await control.resume(run.id, author(ANN))
+        await control.rights.set_rules("David", LIMITED, OLGA)
+        await control.resume(run.id, author(ANN))
+        control.stop_all(author(ANN))
+        await until(lambda: not control.open)
+
+
+def replaced(action: Action) -> Action:
+    """The action with a torque of 80."""
+    return msgspec.structs.replace(action, inputs=(parameter("torque", "number", 80),))

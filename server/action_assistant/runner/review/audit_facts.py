@@ -107,7 +107,7 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
         "pressed Stop of {graph} on {robot}, which somebody else started",
     ),
     "robot.index_write_asked.v1": ("robots", "wrote graphs into the index folder of {robot}"),
-    "robot.rights_set.v1": ("robots", "set who may start on {robot}"),
+    "robot.rights_set.v1": ("robots", "set the rules of {robot}"),
     "robot.locked.v1": ("robots", "took {robot} out of service: {reason}"),
     "robot.unlocked.v1": ("robots", "put {robot} into service again"),
     "repeat.opened.v1": ("starts", "opened a repeat of {graph_name}"),

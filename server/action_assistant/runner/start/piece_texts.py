@@ -25,6 +25,7 @@ from action_assistant.umrf.limits import (
     Limit,
     LimitedInputs,
     OverLimit,
+    extremes,
     inputs_of,
     over_limits,
     with_received,
@@ -109,6 +110,7 @@ def texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, Piec
         own = {name: inside[name] for name in sorted(graphs_within(action, inside))}
         visit = (stamp.run or "") if own else ""
         given = inputs.get(action.key, frozenset())
+        alone = Graph(name=graph.name, actions=(action,))
         leaves, marks, piece, text = _marked(graph, action, visit, stamp, given)
         texts[action.full_name] = PieceText(
             parts=_split(text, stamp),
@@ -120,9 +122,7 @@ def texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, Piec
             marks=marks,
             is_taken=action.key in taken,
             taken_on_false=action.key in on_false,
-            limited=inputs_of(
-                Graph(name=graph.name, actions=(action,)), own, {action.key: leaves.keys()}
-            ),
+            limited=extremes(inputs_of(alone, own, {action.key: leaves.keys()})),
         )
     return texts
 

@@ -261,7 +261,7 @@ class RightsRegistry:
         if limits and claim.limits is not None and "limit" not in blocked:
             said = ", ".join(each.words() for each in limits[:_NAMED])
             more = f" and {len(limits) - _NAMED} more" if len(limits) > _NAMED else ""
-            text = f"Within the limits of {robot}, which the robot does not enforce: {said}{more}."
+            text = f"Limits of {robot}, which the robot does not enforce: {said}{more}."
             found.append(Item(code="limit", verdict="passed", text=text))
         if "drill" not in blocked:
             found += self._drill_items(robot, claim)
