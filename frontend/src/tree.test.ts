@@ -390,6 +390,7 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "status/start-values-form.tsx Input":
     "values of a start: its dialog says which are sent, and the next one begins with these",
   "ui/pick-list.tsx PickList": "a search",
+  "ui/typed-ahead.tsx TypingField": "keys for the field of a part that is loading",
 };
 
 /** Return the functions of a file that draw a text field and hold no draft. */

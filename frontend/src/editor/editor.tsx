@@ -40,6 +40,7 @@ import { useThrottledLink } from "../sync/use-room";
 import { useIsPhone, useIsWide, useKept, useStableCallback } from "../ui/hooks";
 import { boundedPart, Later, useOnceIdle } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
+import { TypingField } from "../ui/typed-ahead";
 import { CanvasPane } from "./canvas-pane";
 import { Overlays } from "./menus/overlays";
 import { DesktopLayout, DryRunButton, PhoneLayout } from "./panels/layouts";
@@ -144,7 +145,7 @@ const FindBar = boundedPart(() => import("../find/find-bar").then((part) => part
   waiting: null,
 });
 const QuickAdd = boundedPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd), {
-  waiting: null,
+  waiting: <TypingField />,
 });
 const HistoryPanel = boundedPart(() =>
   import("../history/history-panel").then((part) => part.HistoryPanel),

@@ -15,7 +15,9 @@ import {
 import { asOneEdit, connect, insertInto, type NewAction } from "../../graph/edit";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
+import { useStableCallback } from "../../ui/hooks";
 import { keyOf } from "../../ui/keys";
+import { type Typed, useTypedAhead } from "../../ui/typed-ahead";
 import { isolated } from "../../words/isolated";
 import style from "./quick-add.module.css";
 
@@ -74,6 +76,11 @@ function placed(context: EditorContext, request: AddRequest, template: NewAction
 
 export function QuickAdd({ context, request, known, onClose }: Props) {
   const [search, setSearch] = useState("");
+  const [ended, setEnded] = useState<Typed["end"]>(null);
+  useTypedAhead(({ text, end }) => {
+    setSearch(text);
+    setEnded(end);
+  });
   const [at, setAt] = useState(0);
   const list = useMemo(() => candidates(known, search), [known, search]);
   const box = useRef<HTMLDivElement>(null);
@@ -94,6 +101,10 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
     context.view.reveal(cornerOf(context, request));
     onClose();
   };
+  const end = useStableCallback(() => (ended === "Enter" ? choose(list[0], true) : onClose()));
+  useEffect(() => {
+    if (ended !== null) end();
+  }, [ended, end]);
   const onKeyDown = (event: React.KeyboardEvent) => {
     const key = keyOf(event);
     if (key === "Escape") onClose();

@@ -19,6 +19,7 @@ import { endName } from "../../graph/relation-words";
 import { keyOf, typedCharacter } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
+import { useTypedAhead } from "../../ui/typed-ahead";
 import { isolated } from "../../words/isolated";
 import { candidates } from "../canvas/quick-add";
 import { leadElsewhere } from "../canvas/use-line-editing";
@@ -169,6 +170,11 @@ function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string 
   const early = useRef("");
   const tell = useRef(onOutcome);
   tell.current = onOutcome;
+  useTypedAhead(({ text }) => {
+    const outcome = OUTCOMES[Number(text[0]) - 1];
+    if (outcome) tell.current(outcome);
+    early.current = outcome ? text.slice(1) : text;
+  });
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       const inField = event.target instanceof HTMLElement && event.target.matches("input, button");

@@ -3,6 +3,7 @@
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { Later, lazyPart, OverlayBoundary, PartBoundary, useOnceIdle } from "../../ui/lazy-part";
+import { TypingField } from "../../ui/typed-ahead";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
 const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
@@ -63,13 +64,15 @@ function OpenOverlay({ context, known, overlay, onClose }: Props) {
   switch (overlay.kind) {
     case "arrow":
       return (
-        <ArrowDialog
-          context={context}
-          known={known}
-          from={overlay.from}
-          to={overlay.to}
-          onClose={onClose}
-        />
+        <PartBoundary waiting={<TypingField />}>
+          <ArrowDialog
+            context={context}
+            known={known}
+            from={overlay.from}
+            to={overlay.to}
+            onClose={onClose}
+          />
+        </PartBoundary>
       );
     case "retarget":
       return <RetargetDialog context={context} {...overlay} onClose={onClose} />;
@@ -91,7 +94,11 @@ function OpenOverlay({ context, known, overlay, onClose }: Props) {
       return <RenamedUses graph={context.id} {...overlay} uses={uses} onClose={onClose} />;
     }
     case "palette":
-      return <CommandPalette context={context} onClose={onClose} />;
+      return (
+        <PartBoundary waiting={<TypingField />}>
+          <CommandPalette context={context} onClose={onClose} />
+        </PartBoundary>
+      );
     case "keys":
       return <ShortcutSheet onClose={onClose} />;
     case "note": // edited on the canvas itself
