@@ -78,6 +78,25 @@ def test_a_run_is_waited_for_and_listed(product: Product, files: dict[str, str])
     assert (listed["id"], listed["state"], listed["result"]) == (run, "finished", "on_true")
 
 
+def test_a_repeat_is_followed_listed_and_written_as_a_table(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    answer = product.cli("run", graph, "--script", files["quick"], "--times", "3")
+    assert answer.returncode == 0, answer.stderr + answer.stdout
+    repeat, *lines, closed = answer.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ["1", "2", "3"]
+    assert closed.startswith("closed: Every run was carried out")
+    assert repeat in product.cli("runs", "repeats").stdout
+    table = product.cli("runs", "repeats", repeat, "--csv").stdout.splitlines()
+    assert len(table) == 4
+    refused = product.cli("runs", "next", repeat)
+    assert refused.returncode != 0
+    assert "was started" in refused.stderr
+    wrong = product.cli("run", graph, "--grid", "place=a,b")
+    assert "is not asked for" in wrong.stderr
+
+
 def test_sub_graphs_run_with_their_graph(product: Product, files: dict[str, str]) -> None:
     imported(product, files["graph"])
     end = {"graph_entry": [{"name": "pair"}], "graph_exit": [{"name": "pair"}]}

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import msgspec
 
+from action_assistant.commands import repeats
 from action_assistant.commands.client import (
     Server,
     add_server,
@@ -115,6 +116,7 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="the value of an input for which the graph asks; again for each. Lists are JSON",
     )
     _add_from(run)
+    repeats.add_options(run)
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
@@ -385,6 +387,10 @@ def _run(options: argparse.Namespace) -> int:
             order["override"] = {"codes": codes.split(","), "reason": reason}
         if script is not None:
             order["script"] = script
+        if repeats.is_asked(options):
+            asked = _asked(server, order) if options.grid else ()
+            grid = repeats.grid_of(options.grid, asked)
+            return repeats.open_repeat(server, order, grid, options)
         run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
         print(run.id, flush=True)
         return 0 if options.no_wait else _watch(server, run.id)
@@ -412,11 +418,15 @@ def _breakpoints(
 def _values(
     server: Server, order: dict[str, Any], settings: Sequence[tuple[str, str]]
 ) -> dict[str, Any]:
+    return values_of(settings, _asked(server, order))
+
+
+def _asked(server: Server, order: dict[str, Any]) -> list["AskedInput"]:
+    """Return the inputs for which a start asks."""
     from action_assistant.umrf.start_values import AskedInput
 
     wanted = {name: order[name] for name in ("umrf", "graph", "from") if name in order}
-    asked = server.runner("POST", "/api/asked_inputs", json=wanted)
-    return values_of(settings, decoded(asked, list[AskedInput]))
+    return decoded(server.runner("POST", "/api/asked_inputs", json=wanted), list[AskedInput])
 
 
 def _watch(server: Server, run: str) -> int:

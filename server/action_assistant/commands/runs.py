@@ -23,6 +23,7 @@ from action_assistant.commands.client import (
 from action_assistant.commands.drafts import changes_lines
 from action_assistant.commands.presses import press
 from action_assistant.commands.questions import add_questions
+from action_assistant.commands.repeats import add_repeats
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.difference import Difference
@@ -43,7 +44,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
     more = runs.add_subparsers(
-        metavar="at-rest | wait | step | go-on | questions | answer | since | verify | archive | restore | copy | examples"
+        metavar="at-rest | wait | step | go-on | questions | answer | repeats | next | stop-repeating | look-again | since | verify | archive | restore | copy | examples"
     )
     rests = command(
         more,
@@ -82,6 +83,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     _add_watching(steps)
     steps.set_defaults(handler=_step)
     add_questions(more)
+    add_repeats(more)
     _add_archives(more)
     _add_copy(more)
     _add_since(more)
