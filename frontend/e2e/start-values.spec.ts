@@ -229,3 +229,51 @@ test("a second person takes over the values for which one asks, and says yes to 
   await ben.context.close();
   await david.kill();
 });
+
+test("a start is repeated over a grid of values; on its page a person starts, closes and opens again", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await dialog(page)
+    .getByRole("radio", { name: /^Simulator/ })
+    .check();
+  const choice = dialog(page).getByRole("region", { name: "Repeat" });
+  await choice.getByRole("checkbox", { name: "Repeat it" }).check();
+  const grid = choice.getByRole("textbox", { name: "Values of torque of Turn" });
+  await values(page).getByRole("textbox", { name: "valve of Turn" }).fill("valve_7");
+  await grid.fill("1\n61");
+  await expect(choice).toContainText("60 at most.");
+  await grid.fill("1\n2.5");
+  await choice.getByRole("textbox", { name: "Rounds" }).fill("2");
+  await expect(choice).toContainText("4 runs, one after the other, in the simulator.");
+  const opens = start(page, /^Repeat v1 in the simulator: 4 runs/);
+  await expect(opens).toBeEnabled({ timeout: 15_000 });
+  await opens.click();
+  const state = page.getByRole("status").filter({ hasText: "finished" });
+  await expect(state).toContainText("Complete", { timeout: 30_000 });
+  const rows = page.getByRole("region", { name: "Runs of the repeat" }).getByRole("row");
+  await expect(rows).toHaveCount(5);
+  await expect(rows.nth(2)).toContainText("Turn torque = 2.5");
+  await expect(page.getByRole("link", { name: "CSV" })).toBeVisible();
+
+  const [version] = await product.ask<{ id: string }[]>(`/api/graphs/${graph}/versions`);
+  const whole = await product.ask<{ digest: string; umrf: object }>(`/api/versions/${version?.id}`);
+  const order = { version: version?.id, digest: whole.digest, umrf: whole.umrf, graph };
+  const by = { engine: "simulator", request_id: "twice", values: { Turn_0: { valve: "v" } } };
+  const opened = await post<{ id: string }>("/api/repeats", {
+    start: { ...order, ...by },
+    times: 2,
+  });
+  await page.goto(`${product.url}/runs/repeats/${opened.id}`);
+  await expect(state).toContainText("Waits for a person: run 1 of 2");
+  await holdEnter(page, page.getByRole("button", { name: /^Start run 1 of 2/ }));
+  await expect(state).toContainText("run 2 of 2", { timeout: 20_000 });
+  await page.getByRole("button", { name: "Stop repeating" }).click();
+  await expect(state).toContainText("stopped repeating");
+  await page.getByRole("button", { name: "Look again, and open it" }).click();
+  await holdEnter(page, page.getByRole("button", { name: /^Reset done: start 2 of 2/ }));
+  await expect(state).toContainText("Complete", { timeout: 20_000 });
+  await page.goto(`${product.url}/runs/repeats`);
+  await expect(page.getByRole("link", { name: /^turn, 4 runs/ })).toBeVisible();
+});

@@ -121,7 +121,17 @@ const asBreakpoints = (
 export async function startRun(order: StartOrder): Promise<Started> {
   const [engine = "", ...others] = order.engines;
   const runner = runnerAt(order.runner);
-  const body = {
+  const body = await startBody(order);
+  if (others.length > 0) {
+    return runner.post("/api/groups", { body: { ...body, engines: order.engines } });
+  }
+  const run = await runner.post("/api/runs", { body: { ...body, engine } });
+  return { runs: [run], failed: {} };
+}
+
+/** A start as it is sent, without its engines. */
+export async function startBody(order: StartOrder) {
+  return {
     version: order.version,
     digest: order.digest,
     graph: order.graph,
@@ -139,11 +149,6 @@ export async function startRun(order: StartOrder): Promise<Started> {
     umrf: order.umrf,
     ...order.inside,
   };
-  if (others.length > 0) {
-    return runner.post("/api/groups", { body: { ...body, engines: order.engines } });
-  }
-  const run = await runner.post("/api/runs", { body: { ...body, engine } });
-  return { runs: [run], failed: {} };
 }
 
 /** The runner's knowledge of a start. Without runs and not `under_way`: it has none so far. */

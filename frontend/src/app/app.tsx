@@ -29,6 +29,8 @@ import {
   HomeScreen,
   PeopleScreen,
   ProgramsScreen,
+  RepeatScreen,
+  RepeatsScreen,
   RobotsScreen,
   RunScreen,
   RunsScreen,
@@ -156,6 +158,18 @@ function Screens() {
         <Screen crumbs={[graphs, runs]}>
           <StatisticsScreen />
         </Screen>
+      </Route>
+      <Route path="/runs/repeats">
+        <Screen crumbs={[graphs, runs]}>
+          <RepeatsScreen />
+        </Screen>
+      </Route>
+      <Route path="/runs/repeats/:id">
+        {({ id }) => (
+          <Screen crumbs={[graphs, runs]} key={id}>
+            <RepeatScreen id={id} />
+          </Screen>
+        )}
       </Route>
       <Route path="/runs/:id">
         {({ id }) => (

@@ -2,6 +2,7 @@
 import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
 import { ComparePage } from "../review/compare-page";
+import { RepeatPage, RepeatsPage } from "../review/repeat-page";
 import type { RepeatActions } from "../review/run-menu";
 import { RunPage } from "../review/run-page";
 import { RunsPage } from "../review/runs-page";
@@ -53,6 +54,24 @@ function Again({ engines, onClose, ...what }: RepeatActions & { onClose: () => v
         onClose={onClose}
       />
     </OverlayBoundary>
+  );
+}
+
+export function RepeatsScreen() {
+  useTitle("Repeats");
+  return (
+    <PageFrame>
+      <RepeatsPage bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
+  );
+}
+
+export function RepeatScreen({ id }: { id: string }) {
+  useTitle("Repeat");
+  return (
+    <PageFrame>
+      <RepeatPage id={id} bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
   );
 }
 

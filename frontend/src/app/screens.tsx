@@ -28,6 +28,8 @@ export const ActionsScreen = lazyPart(() =>
 );
 export const RunsScreen = lazyPart(() => review().then((part) => part.RunsScreen));
 export const RunScreen = lazyPart(() => review().then((part) => part.RunScreen));
+export const RepeatScreen = lazyPart(() => review().then((part) => part.RepeatScreen));
+export const RepeatsScreen = lazyPart(() => review().then((part) => part.RepeatsScreen));
 export const CompareScreen = lazyPart(() => review().then((part) => part.CompareScreen));
 export const StatisticsScreen = lazyPart(() => review().then((part) => part.StatisticsScreen));
 /** The page of a link that shows one thing: no screen leads there. */

@@ -4,6 +4,7 @@ import { ActionIcon, Button, TagsInput, Textarea } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconPin, IconPinFilled } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
+import { Link } from "wouter";
 import { useVersions, versionName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { actorWords } from "../api/people";
@@ -52,6 +53,7 @@ export function RunFacts({ runner, run, version, by }: Props) {
       "Limits",
       `${isolated(robot)}: ${limits.map(limitWords).join(", ")}`,
     ]),
+    ...(run.repeat ? [["Repeat", `its run ${run.repeat.cell}`] as [string, string]] : []),
     ["Engine", runPlace(run)],
     ["Started by", `${by}${requesterPlace(run.author)}`],
     ...(run.batons
@@ -104,7 +106,13 @@ export function RunFacts({ runner, run, version, by }: Props) {
       {rows.map(([name, value]) => (
         <div key={`${name} ${value}`}>
           <dt className="ink2">{name}</dt>
-          <dd className={name.startsWith("Digest") ? "text-11_5 mono" : undefined}>{value}</dd>
+          <dd className={name.startsWith("Digest") ? "text-11_5 mono" : undefined}>
+            {name === "Repeat" && run.repeat ? (
+              <Link to={`/runs/repeats/${run.repeat.id}`}>{value}</Link>
+            ) : (
+              value
+            )}
+          </dd>
         </div>
       ))}
     </dl>

@@ -315,6 +315,9 @@ export function RunsPage() {
           <RunFilters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
         </div>
         <div className={style.buttons} aria-live="polite">
+          <Button component={Link} to="/runs/repeats" size="compact-sm" variant="subtle">
+            Repeats
+          </Button>
           {waiting > 0 && (
             <Button size="compact-sm" variant="light" onClick={() => void listed.refetch()}>
               {waiting === 1 ? "1 new run" : `${waiting} new runs`}

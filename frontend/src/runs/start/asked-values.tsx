@@ -77,6 +77,8 @@ export interface AskedValues {
   readonly isIncomplete: boolean;
   /** The values that are looked at and sent; null until all are given. */
   readonly values: StartValues | null;
+  /** The inputs for which the start asks. */
+  readonly asked: readonly AskedInput[];
   readonly obstacle: string | null;
   readonly error: Error | null;
   /** The question that the values answer unchanged. */
@@ -147,7 +149,7 @@ export function useAskedValues(
   };
   const obstacle = obstacleOf(known.asked, drafts, typed.wrong, !isSettled);
   const isIncomplete = typed.wrong.size > 0;
-  return { values, isIncomplete, obstacle, error: known.error, taken, form };
+  return { values, asked, isIncomplete, obstacle, error: known.error, taken, form };
 }
 
 interface WantedProps {

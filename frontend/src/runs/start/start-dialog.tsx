@@ -28,6 +28,7 @@ import { lineWords, valueLines } from "../../status/value-words";
 import { useWatching, WatchTicks } from "../../status/watching";
 import { textScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
+import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import { useAskedValues, ValueList } from "./asked-values";
 import {
@@ -40,6 +41,7 @@ import {
   WayChoice,
 } from "./led-choice";
 import { PreflightList } from "./preflight-list";
+import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
 import { SecondPerson } from "./second-person";
 import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";
@@ -386,6 +388,11 @@ export function StartDialog(props: Props) {
   const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
   const error = way.text.error ?? way.marks.error ?? given.error ?? lookError;
   const start = useStart(graph);
+  const mayMove = engines.some((engine) => engine !== SIMULATOR);
+  const repeats = useRepeatChoice(given.asked, mayMove, `${textScope(graph, person.id)}repeat`);
+  const open = useOpenRepeat(graph);
+  const mayRepeat = beginning === undefined && asked.length === 1 && !said.drill;
+  const repeat = mayRepeat ? repeats.order : null;
   const looks = look.data;
   const earlier = looks?.find((each) => each.earlier)?.earlier;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -393,12 +400,13 @@ export function StartDialog(props: Props) {
   const why =
     now.link === "down"
       ? "The runner does not answer"
-      : start.isPending
+      : start.isPending || open.isPending
         ? "Starting …"
         : (way.missing ??
           given.obstacle ??
           watch.obstacle ??
           begins.obstacle(earlier) ??
+          (repeat && repeats.obstacle) ??
           (look.isPlaceholderData
             ? "Looking …"
             : obstacleOf(led ? asked : engines, looks, reason)));
@@ -434,6 +442,10 @@ export function StartDialog(props: Props) {
       watch.forget();
       setDrills(false);
     };
+    if (repeat !== null) {
+      open.mutate({ ...sent, ...override, repeat }, { onSuccess: () => done({ runs: [] }) });
+      return;
+    }
     start.mutate({ ...sent, ...override }, { onSuccess: done, onSettled });
   };
   // Of a part only some robots are looked at: those of the others are not needed.
@@ -443,7 +455,9 @@ export function StartDialog(props: Props) {
   const moves = moving.some((engine) => engine !== SIMULATOR);
   const verb = moves ? "Start" : "Run";
   const at = moves ? `on ${where.map(isolated).join(", ")}` : "in the simulator";
-  const what = `${verb} ${isolated(label)}${how} ${at}`;
+  const what = repeat
+    ? `Repeat ${isolated(label)}${how} ${at}: ${counted(repeats.count, "run")}`
+    : `${verb} ${isolated(label)}${how} ${at}`;
   return (
     <Modal
       opened
@@ -483,6 +497,7 @@ export function StartDialog(props: Props) {
       {choice}
       {begins.part(earlier)}
       {given.form(lookError)}
+      {mayRepeat && repeats.part}
       <WatchTicks watch={watch} />
       {asked.length > 0 && (
         <section
@@ -562,10 +577,10 @@ export function StartDialog(props: Props) {
         />
         <StartButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
-          label={why ?? (moves ? "Hold to start" : what)}
+          label={why ?? (moves && !repeat ? "Hold to start" : what)}
           name={why === null ? what : `${verb} ${label}: ${why}`}
           question={
-            moves
+            moves && !repeat
               ? `Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}${withWords(values)}?${led ? ` ${movesWords(castFor(cast, moving))}` : ""}`
               : null
           }

@@ -1,0 +1,81 @@
+/** Repeats: one start, carried out several times or over a grid of values. */
+import { useQuery } from "@tanstack/react-query";
+import { runnerAt } from "./client";
+import { type Run, type StartOrder, startBody, type Watching } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+export type Repeat = RunnerApi["RepeatShown"];
+export type RepeatSummary = RunnerApi["RepeatSummary"];
+export type Axis = RunnerApi["Axis"];
+
+/** How often a start is carried out, and with which values. */
+export interface RepeatOrder {
+  readonly times: number;
+  readonly grid: readonly Axis[];
+  readonly seed: number | null;
+  /** In the simulator alone: the next run starts when the one before has ended true. */
+  readonly by_itself: boolean;
+}
+
+const POLL = 1_000; // ms
+
+/** Open a repeat. On robots nothing starts by that. */
+export async function openRepeat(order: StartOrder, repeat: RepeatOrder): Promise<Repeat> {
+  const [engine = ""] = order.engines;
+  const start = { ...(await startBody(order)), engine };
+  const body = { ...repeat, start } as RunnerApi["RepeatRequest"];
+  return runnerAt(order.runner).post("/api/repeats", { body });
+}
+
+/** Query a repeat, again and again while it is open or a run of it goes on. */
+export function useRepeat(runner: string | undefined, id: string) {
+  return useQuery({
+    queryKey: ["repeats", id],
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/repeats/{repeat}", { path: { repeat: id }, signal }),
+    enabled: runner !== undefined,
+    refetchInterval: ({ state }) => (state.data?.state === "closed" ? false : POLL),
+  });
+}
+
+export function useRepeats(runner: string | undefined) {
+  return useQuery({
+    queryKey: ["repeats"],
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/repeats", { query: {}, signal }),
+    enabled: runner !== undefined,
+  });
+}
+
+/** Say that everything is set back, and start the cell. */
+export function startCell(
+  runner: string,
+  repeat: string,
+  cell: number,
+  watching: Watching,
+): Promise<Run> {
+  const path = { repeat };
+  return runnerAt(runner).post("/api/repeats/{repeat}/start", { path, body: { cell, watching } });
+}
+
+/** Stop repeating; a run that goes on is not stopped. */
+export function closeRepeat(runner: string, repeat: string): Promise<Repeat> {
+  return runnerAt(runner).post("/api/repeats/{repeat}/close", { path: { repeat } });
+}
+
+/** Open a closed repeat again after a look. */
+export function reopenRepeat(
+  runner: string,
+  { id, closings }: Pick<Repeat, "id" | "closings">,
+  watching: Watching,
+): Promise<Repeat> {
+  const path = { repeat: id };
+  return runnerAt(runner).post("/api/repeats/{repeat}/open", {
+    path,
+    body: { closings, watching },
+  });
+}
+
+/** Return the address of the table as a CSV file. */
+export function tableUrl(runner: string, repeat: string): string {
+  return `${runner}/api/repeats/${encodeURIComponent(repeat)}/table`;
+}
