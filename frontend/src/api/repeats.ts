@@ -1,5 +1,6 @@
 /** Repeats: one start, carried out several times or over a grid of values. */
 import { useQuery } from "@tanstack/react-query";
+import { serverNow } from "../clock/server-clock";
 import { runnerAt } from "./client";
 import { type Run, type StartOrder, startBody, type Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -18,6 +19,15 @@ export interface RepeatOrder {
 }
 
 const POLL = 1_000; // ms
+const SUMMED_WITHIN = 15_000; // ms after its end a run has its sums
+
+/** Return whether the times of a run that has just ended are still to come. */
+function isSummedSoon({ cells }: Repeat): boolean {
+  return cells.some(
+    ({ run }) =>
+      run?.ended_at && !run.took && serverNow() - Date.parse(run.ended_at) < SUMMED_WITHIN,
+  );
+}
 
 /** Open a repeat. On robots nothing starts by that. */
 export async function openRepeat(order: StartOrder, repeat: RepeatOrder): Promise<Repeat> {
@@ -34,7 +44,8 @@ export function useRepeat(runner: string | undefined, id: string) {
     queryFn: ({ signal }) =>
       runnerAt(runner).get("/api/repeats/{repeat}", { path: { repeat: id }, signal }),
     enabled: runner !== undefined,
-    refetchInterval: ({ state }) => (state.data?.state === "closed" ? false : POLL),
+    refetchInterval: ({ state }) =>
+      state.data?.state === "closed" && !isSummedSoon(state.data) ? false : POLL,
   });
 }
 

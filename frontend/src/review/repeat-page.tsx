@@ -195,15 +195,16 @@ function stateWords({ state, closed, next, total }: Repeat): string {
 
 function Found({ repeat, runner }: { repeat: Repeat; runner: string }) {
   const range = rangeWords(repeat.cells.map(({ run }) => run?.took));
+  const isDoubted = repeat.closed !== null && repeat.closed.why !== "complete";
   const started = repeat.cells.filter(({ run }) => run !== null).length;
   return (
     <div className={style.inner}>
       <div className="page-head">
         <h2 className="page-title">
-          <bdi>{repeat.graph_name}</bdi>, {repeat.total} times {where(repeat)}
+          <bdi>{repeat.graph_name}</bdi>, {counted(repeat.total, "run")} {where(repeat)}
         </h2>
       </div>
-      <p className={style.state} role="status" data-closed={repeat.closed !== null || undefined}>
+      <p className={style.state} role="status" data-doubt={isDoubted || undefined}>
         <b>{stateWords(repeat)}.</b> {repeat.closed?.text} {repeat.finished} of {repeat.total}{" "}
         finished{range && `, in ${range}`}.
         {repeat.seed !== null && ` Shuffled by the seed ${repeat.seed}.`}

@@ -51,6 +51,8 @@ interface Choice {
   readonly count: number;
   readonly obstacle: string | null;
   readonly part: ReactNode;
+  /** Forget what was typed: the repeat has it. */
+  readonly forget: () => void;
 }
 
 /** `moves`: a robot may move, so that a person starts each run; `place`: where typed values are kept. */
@@ -139,7 +141,7 @@ export function useRepeatChoice(
       )}
     </section>
   );
-  return { order, count, obstacle, part };
+  return { order, count, obstacle, part, forget: () => keep("") };
 }
 
 /** Open a repeat of exactly what was looked at, and go to its page. */

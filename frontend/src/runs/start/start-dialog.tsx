@@ -443,7 +443,11 @@ export function StartDialog(props: Props) {
       setDrills(false);
     };
     if (repeat !== null) {
-      open.mutate({ ...sent, ...override, repeat }, { onSuccess: () => done({ runs: [] }) });
+      const opened = () => {
+        repeats.forget();
+        done({ runs: [] });
+      };
+      open.mutate({ ...sent, ...override, repeat }, { onSuccess: opened });
       return;
     }
     start.mutate({ ...sent, ...override }, { onSuccess: done, onSettled });
