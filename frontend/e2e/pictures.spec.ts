@@ -308,6 +308,7 @@ test.describe("robots", () => {
     carol.freeze();
     await page.getByRole("button", { name: /^Stop run/ }).tap();
     await expect(page.getByRole("alert")).toContainText("STOP UNCONFIRMED");
+    await expect(page.getByRole("alert").getByRole("button", { name: /^I looked/ })).toBeVisible();
     await picture(page, "stop-unconfirmed-phone");
     await context.close();
   });
