@@ -24,6 +24,8 @@ from action_assistant.runner.repeats.repeat import (
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Requested
+from runner.execution.test_conductor import Lab as LedLab
+from runner.execution.test_conductor import led, shared
 from runner.harness import (
     Harness,
     Robot,
@@ -36,6 +38,7 @@ from runner.harness import (
     until,
     virtual,
 )
+from runner.harness import ended as run_ended
 from runner.start.test_rights_registry import ANN, BEN, OLGA, Ended, author
 from runner.start.test_start_values import asking
 from support.doses import examples
@@ -249,6 +252,28 @@ async def test_a_stop_that_comes_while_a_start_is_being_stored_lets_nothing_leav
 
 
 @virtual
+async def test_a_led_run_is_repeated_and_a_stop_of_its_piece_closes_the_repeat() -> None:
+    lab = LedLab(QUICK)
+    async with (
+        lab.runner() as control,
+        Repeats.opened(
+            control, lab.harness.journal, clock_us=clock_us, run_in_worker=at_once
+        ) as repeats,
+    ):
+        start = led(shared(sequence("task", 2), "Scout", "Carrier"))
+        repeat = await opened(repeats, RepeatRequest(start=start, times=2))
+        assert len(repeat.opened.robots) == 2
+        run = await pressed(repeats, repeat, 1)
+        await until(lambda: f"{run}.1" in control.open)
+        await control.stop(f"{run}.1", author(BEN))
+        assert await closed(repeats, repeat) == "stop"
+        await until(lambda: not control.open)
+        await repeats.reopen(repeat.id, ReopenRequest(1), author(ANN), ANN)
+        await over(control, await pressed(repeats, repeat, 2))
+        assert await closed(repeats, repeat) == "complete"
+
+
+@virtual
 async def test_a_lost_robot_a_changed_baton_and_a_word_of_rest_close_repeats() -> None:
     lab = Lab({"*": [{"never": True}]})
     async with lab.runner() as (control, repeats):
@@ -335,6 +360,18 @@ async def test_a_refused_start_uses_up_no_cell_and_a_value_that_cannot_be_is_nam
         lab.harness.journal.down = False
         await over(control, await pressed(repeats, repeat, 1))
         assert len(lab.david.starts) == 1
+
+
+@virtual
+async def test_runs_that_change_while_the_runner_shuts_down_find_no_repeats_to_close() -> None:
+    lab = Lab()
+    async with lab.harness.runner(lab.ended) as control:
+        async with Repeats.opened(
+            control, lab.harness.journal, clock_us=clock_us, run_in_worker=at_once
+        ) as repeats:
+            repeat = await opened(repeats, on_david(times=1))
+            run = await pressed(repeats, repeat, 1)
+        assert await run_ended(control, run) == "finished"
 
 
 STEPS = st.lists(

@@ -153,6 +153,7 @@ class Repeats:
             try:
                 yield repeats
             finally:
+                repeats._records.clear()  # runs change further, while nobody stores what that closes
                 tasks.cancel_scope.cancel()
 
     # --- what there is ------------------------------------------------------------------------
