@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.hardware_stop import StopSignal
 from action_assistant.runner.links.port import (
     Answer,
     Candidate,
@@ -95,6 +96,10 @@ class RegisteredRobots:
         """The robot of that name."""
         self.facts[registration.name] = facts
         return self.robots[registration.name]
+
+    async def stop_signal(self, *_: object) -> StopSignal:
+        """Return a signal that nobody writes."""
+        return StopSignal()
 
     async def sighting(self) -> Sighting:
         """Return the engines in sight."""

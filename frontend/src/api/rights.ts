@@ -11,6 +11,7 @@ import type { RunnerApi } from "./schema/runner";
 /** What the signed-in person may do on a robot. `why`: why they may not start there, "" if they may. */
 export type RobotRight = RunnerApi["RightShown"];
 export type RightsWanted = Required<RunnerApi["RightsWanted"]>;
+export type ReportedStop = RunnerApi["HardwareStopShown"];
 export type LimitedTo = RunnerApi["Limit"];
 export type AllowedOperator = RunnerApi["OperatorShown"];
 
@@ -26,13 +27,14 @@ export function limitWords({ parameter, action, least, most }: LimitedTo): strin
 export function useRights() {
   const { runner, now } = useLive();
   const { person, visit } = usePerson();
-  const known = now.engines.map(({ name, operators, baton, holder, locks, drill_due }) => [
+  const known = now.engines.map(({ name, operators, baton, holder, locks, drill_due, pressed }) => [
     name,
     operators,
     baton,
     holder,
     locks,
     drill_due,
+    pressed,
   ]);
   return useQuery({
     queryKey: ["robots", "rights", person.id, person.role, visit, JSON.stringify(known)],

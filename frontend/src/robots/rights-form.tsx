@@ -24,6 +24,7 @@ import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
 import { draftsOf, LimitFields, limitsOf } from "./limit-fields";
 import style from "./rights-form.module.css";
+import { StopTopicFields } from "./stop-topic-fields";
 
 const NOBODY: readonly AllowedOperator[] = [];
 const MONTH = 30;
@@ -107,6 +108,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
   const [watched, setWatched] = useState(robot.watched);
   const [days, setDays] = useState<number | null>(robot.drill_days);
   const [releasedOnly, setReleasedOnly] = useState(robot.released_only);
+  const [stop, setStop] = useState(robot.hardware_stop);
   const [limits, setLimits] = useState(() => draftsOf(robot.limits));
   usePendingText(
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
@@ -127,6 +129,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
         released_only: releasedOnly,
         ask_again: Number(askAgain) || 0,
         limits: limitsOf(limits),
+        hardware_stop: stop,
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
@@ -209,6 +212,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
             value={askAgain}
             onChange={setAskAgain}
           />
+          <StopTopicFields stop={stop} onChange={setStop} />
           <LimitFields drafts={limits} onChange={setLimits} />
           {error !== null && (
             <Text c="var(--error)" role="alert">

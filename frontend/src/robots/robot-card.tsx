@@ -67,6 +67,10 @@ function robotSigns(robot: Robot): Sign[] {
     const text = "Led step by step: a run may start further actions on it until it ends";
     signs.push({ good: true, text });
   }
+  if (robot.hardware_stop !== null) {
+    const text = robot.pressed || "Its hardware stop is not pressed, as it reports";
+    signs.push({ good: robot.pressed === "", text });
+  }
   if (robot.others > 0) {
     const who = robot.others === 1 ? "1 other program" : `${robot.others} other programs`;
     signs.push({ good: false, text: `${isolated(who)} can also start graphs on it` });

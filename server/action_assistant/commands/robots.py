@@ -117,6 +117,33 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         "each, and all others are dropped",
     )
     rights.add_argument("--no-limits", action="store_true", help="drop all limits")
+    rights.add_argument(
+        "--stop-topic",
+        metavar="TOPIC",
+        help="its hardware stop is reported there: information, no safety function; '' for nowhere",
+    )
+    rights.add_argument(
+        "--stop-kind",
+        choices=["bool", "diagnostics"],
+        help="a std_msgs/Bool (the default), or a diagnostic_msgs/DiagnosticArray",
+    )
+    rights.add_argument(
+        "--stop-age",
+        type=float,
+        metavar="SECONDS",
+        help="an older message counts as pressed; default: 1",
+    )
+    rights.add_argument(
+        "--stop-pressed",
+        choices=["true", "false"],
+        help="the Bool that means pressed; default: true",
+    )
+    rights.add_argument(
+        "--stop-status", metavar="NAME", help="the status that counts; default: every one"
+    )
+    rights.add_argument(
+        "--stop-level", type=int, metavar="N", help="the level from which it does; default: 2"
+    )
     rights.set_defaults(handler=_rights)
 
 
@@ -236,6 +263,7 @@ def _rights(options: argparse.Namespace) -> int:
             options.ask_again,
             options.limit,
             options.no_limits or None,
+            options.stop_topic,
         )
         if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
@@ -255,6 +283,8 @@ def _rights(options: argparse.Namespace) -> int:
             }
             if options.limit or options.no_limits:
                 wanted["limits"] = [_limit(each) for each in options.limit or ()]
+            if options.stop_topic is not None:
+                wanted["hardware_stop"] = _hardware_stop(options)
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
     print(one_line(f"{robot.name}: {_operators_text(robot)}"))
@@ -278,6 +308,9 @@ def _rules_texts(robot: "Robot") -> list[str]:
     if robot.released_only:
         said.append(f"only released versions start on {robot.name}")
     said += [f"{each.words()} on {robot.name}" for each in robot.limits]
+    if robot.hardware_stop is not None:
+        said.append(f"the hardware stop of {robot.name} is reported on {robot.hardware_stop.topic}")
+        said.append(robot.pressed or "it is not pressed")
     if robot.drill_days is not None:
         said.append(f"a Stop drill of {robot.name} counts for {robot.drill_days} days")
     return said
@@ -342,6 +375,21 @@ def _limit(asked: str) -> dict[str, Any]:
             f"{asked!r} is no limit; write it as torque=..60 or Grip.torque=5..60."
         ) from wrong
     return {"parameter": parameter, "action": action, **found}
+
+
+def _hardware_stop(options: argparse.Namespace) -> dict[str, Any] | None:
+    """Return where a hardware stop is reported; None for nowhere."""
+    given = {
+        "kind": options.stop_kind,
+        "age_s": options.stop_age,
+        "pressed": None if options.stop_pressed is None else options.stop_pressed == "true",
+        "status": options.stop_status,
+        "level": options.stop_level,
+    }
+    if not options.stop_topic:
+        return None
+    named = {name: value for name, value in given.items() if value is not None}
+    return {"topic": options.stop_topic, **named}
 
 
 def _names(server: Server) -> dict[str, str]:

@@ -10,6 +10,7 @@ from typing import Any
 import anyio
 import pytest
 
+from action_assistant.runner.links.hardware_stop import StopSignal
 from action_assistant.runner.links.port import Candidate, Registration, Sighting, Standing
 from action_assistant.runner.links.ros2 import checkup
 from action_assistant.runner.links.ros2.checkup import shared_memory
@@ -68,6 +69,10 @@ class Seen:
     def link(self, registration: Registration, facts: EngineFacts) -> Any:
         """A link to a robot of which no engine is seen."""
         return Gone()
+
+    async def stop_signal(self, *_: object) -> StopSignal:
+        """Return a signal that nobody writes."""
+        return StopSignal()
 
     async def sighting(self) -> Sighting:
         """The engines in sight, and that no other will come."""

@@ -988,6 +988,43 @@ export interface RunnerApi {
         };
     };
     /**
+     * HardwareStopShown
+     * @description Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
+     *     Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
+     *     every status) at this `level` or above means pressed.
+     */
+    HardwareStopShown: {
+        topic: string;
+        /** @enum {string} */
+        kind: "bool" | "diagnostics";
+        age_s: number;
+        pressed: boolean;
+        status: string;
+        level: number;
+    };
+    /**
+     * HardwareStopWanted
+     * @description Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
+     *     Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
+     *     every status) at this `level` or above means pressed.
+     */
+    HardwareStopWanted: {
+        topic: string;
+        /**
+         * @default bool
+         * @enum {string}
+         */
+        kind?: "bool" | "diagnostics";
+        /** @default 1 */
+        age_s?: number;
+        /** @default true */
+        pressed?: boolean;
+        /** @default  */
+        status?: string;
+        /** @default 2 */
+        level?: number;
+    };
+    /**
      * Health
      * @description The answer of a process that is alive. `commit`: of this program, null if unknown.
      */
@@ -2066,7 +2103,8 @@ export interface RunnerApi {
      *     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
      *     `released_only`: only versions start there that an owner has released;
      *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
-     *     `limits`: of the numbers that are sent there; where they are missing, they stay as they are.
+     *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not; where
+     *     one of these is missing, it stays as it is.
      */
     RightsWanted: {
         /** @default all */
@@ -2082,6 +2120,7 @@ export interface RunnerApi {
         /** @default 0 */
         ask_again?: number;
         limits?: RunnerApi["LimitWanted"][];
+        hardware_stop?: RunnerApi["HardwareStopWanted"] | null;
     };
     /**
      * Robot
@@ -2095,7 +2134,8 @@ export interface RunnerApi {
      *     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
      *     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
      *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
-     *     `limits`: of the numbers that are sent there.
+     *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
+     *     is not; `pressed`: why it counts as pressed, "" if it does not.
      */
     Robot: {
         name: string;
@@ -2133,6 +2173,8 @@ export interface RunnerApi {
         released_only: boolean;
         ask_again: number;
         limits: RunnerApi["Limit"][];
+        hardware_stop: RunnerApi["HardwareStopShown"] | null;
+        pressed: string;
     };
     /**
      * RobotChange

@@ -13,6 +13,7 @@ from action_assistant.kit.moments import sent_us
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.run_guard import require_run, unseen_by
 from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.links.hardware_stop import HardwareStop, SignalKind
 from action_assistant.runner.robots.registration import DrillShown, Robot, drill_view
 from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs import views
@@ -54,13 +55,27 @@ class LimitWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     most: float | None = None
 
 
+class HardwareStopWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
+    Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
+    every status) at this `level` or above means pressed."""
+
+    topic: Annotated[str, msgspec.Meta(max_length=200)]
+    kind: SignalKind = "bool"
+    age_s: float = 1.0
+    pressed: bool = True
+    status: Annotated[str, msgspec.Meta(max_length=200)] = ""
+    level: Annotated[int, msgspec.Meta(ge=1, le=3)] = 2
+
+
 class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
     `released_only`: only versions start there that an owner has released;
     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
-    `limits`: of the numbers that are sent there; where they are missing, they stay as they are."""
+    `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not; where
+    one of these is missing, it stays as it is."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
@@ -73,6 +88,7 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     limits: (
         Annotated[tuple[LimitWanted, ...], msgspec.Meta(max_length=MOST_LIMITS)] | msgspec.UnsetType
     ) = msgspec.UNSET
+    hardware_stop: HardwareStopWanted | msgspec.UnsetType | None = msgspec.UNSET
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -324,6 +340,13 @@ def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
     for index, limit in enumerate(limits):
         if limit.fault:
             raise BadInput(limit.fault, where={"path": f"/limits/{index}"})
+    stop = before.hardware_stop
+    if wanted.hardware_stop is None:
+        stop = None
+    elif wanted.hardware_stop is not msgspec.UNSET:
+        stop = HardwareStop(**msgspec.structs.asdict(wanted.hardware_stop))
+        if stop.fault:
+            raise BadInput(stop.fault, where={"path": "/hardware_stop"})
     operators: tuple[Operator, ...] | None = None
     if wanted.operators != "all":
         ids = [each.id for each in wanted.operators]
@@ -338,6 +361,7 @@ def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
         released_only=wanted.released_only,
         ask_again=wanted.ask_again,
         limits=limits,
+        hardware_stop=stop,
     )
 
 

@@ -16,8 +16,10 @@ from sqlalchemy import Row
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
+from action_assistant.runner.execution.conducted_steps import RUNNER
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.earlier_runs import EarlierRuns
+from action_assistant.runner.execution.hardware_stops import HardwareStops
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.led_commands import (
     LedCommands,
@@ -114,6 +116,14 @@ class ExecutionService:
         self.rights: Final = RightsRegistry(
             robots, runtime, self._rights_changed, identity_now, sources.release_of
         )
+        self.hardware_stops: Final = HardwareStops(
+            robots,
+            runtime,
+            self.rights.hardware_stop_of,
+            self._stop_pressed,
+            self._rights_changed,
+        )
+        self.rights.why_pressed = self.hardware_stops.why
         look = LedLook(
             self._runs,
             self.foreign_stops,
@@ -228,7 +238,27 @@ class ExecutionService:
         for watcher in self._robot_watchers:
             watcher()
 
+    def _stop_pressed(self, robot: str, why: str) -> None:
+        """Close the gates of the runs on a robot whose hardware stop counts as pressed from now on, and
+        begin to stop them and what others have started there."""
+        author = msgspec.structs.replace(RUNNER, name=f"the hardware stop of {robot}")
+        self._stops.note(robot, author)
+        self._conductors.rights_changed(robot)
+        going = {
+            run: opened
+            for run, opened in self._runs.on(robot).items()
+            if opened.run.end is None and opened.run.desired != "stopped"
+        }
+        try:
+            self._stop_each(tuple(going), author, "")
+        finally:
+            self.foreign_stops.stop(author, self._runs.on, robot)
+            for opened in going.values():
+                if not opened.is_led:
+                    opened.alarm("hardware_stop", why)
+
     def _rights_changed(self, robot: str) -> None:
+        self.hardware_stops.look()
         self._conductors.rights_changed(robot)
         self._robots_changed()
 
@@ -513,7 +543,7 @@ class ExecutionService:
             )
         rights = self.rights.of(plain.name)
         due = rights.drill_due(self._runtime.clock_us() / 1e6)
-        return with_rights(plain, rights, shown, due)
+        return with_rights(plain, rights, shown, due, self.hardware_stops.why(plain.name))
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Register a robot, or change its registration, and return it. Raise BadInput if the
@@ -581,6 +611,7 @@ class ExecutionService:
         self.rights.take_up(await self._runtime.journal.query(queries.all_rights()))
         for row in await self._runtime.journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
+        self._runtime.tasks.start_soon(self.hardware_stops.run)
         for row in await self._runtime.journal.query(queries.open_runs()):
             run, seq, is_whole = await self.history.left(row.id)
             if run is None:

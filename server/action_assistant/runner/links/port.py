@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, Protocol, TypeAlias
 import msgspec
 
 from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
 from action_assistant.runner.links.observations import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Precondition
@@ -333,6 +334,17 @@ class Reach(Protocol):
         never waits and never fails: for a robot that cannot be reached, the link refuses every
         command with the reason. The link receives reports and answers only while its `run` method
         runs."""
+        ...
+
+    async def stop_signal(
+        self,
+        registration: Registration,
+        facts: EngineFacts,
+        rule: HardwareStop,
+        changed: Callable[[], None],
+    ) -> StopSignal:
+        """Listen to the hardware stop of a robot from now on. `changed` is called after a message that
+        says another thing than the one before it. Raise RuntimeError if that is not possible."""
         ...
 
     async def sighting(self) -> Sighting:

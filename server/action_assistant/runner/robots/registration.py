@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict
+from action_assistant.runner.links.hardware_stop import SignalKind
 from action_assistant.runner.links.port import (
     CONDUCTED,
     SIMULATOR,
@@ -119,6 +120,19 @@ class DrillShown(msgspec.Struct, frozen=True, kw_only=True):
     failure: str
 
 
+class HardwareStopShown(msgspec.Struct, frozen=True, kw_only=True):
+    """Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
+    Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
+    every status) at this `level` or above means pressed."""
+
+    topic: str
+    kind: SignalKind
+    age_s: float
+    pressed: bool
+    status: str
+    level: int
+
+
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why`: explains any state but `answering`.
 
@@ -130,7 +144,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
-    `limits`: of the numbers that are sent there.
+    `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
+    is not; `pressed`: why it counts as pressed, "" if it does not.
     """
 
     name: str
@@ -165,6 +180,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     released_only: bool = False
     ask_again: int = 0
     limits: tuple[Limit, ...] = ()
+    hardware_stop: HardwareStopShown | None = None
+    pressed: str = ""
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -274,10 +291,10 @@ def seen_by(
 
 
 def with_rights(
-    plain: Robot, rights: RobotRights, holder: HolderShown | None, drill_due: str
+    plain: Robot, rights: RobotRights, holder: HolderShown | None, drill_due: str, pressed: str
 ) -> Robot:
     """Return a robot with its rights. `holder`: who holds its baton; `drill_due`: why a Stop drill has
-    to be made, "" if none has to be."""
+    to be made, "" if none has to be; `pressed`: why its hardware stop counts as pressed."""
     rules = rights.rules
     operators: Literal["all"] | tuple[OperatorShown, ...] = "all"
     if rules.operators is not None:
@@ -305,4 +322,7 @@ def with_rights(
         released_only=rules.released_only,
         ask_again=rules.ask_again,
         limits=rules.limits,
+        hardware_stop=rules.hardware_stop
+        and HardwareStopShown(**msgspec.structs.asdict(rules.hardware_stop)),
+        pressed=pressed,
     )

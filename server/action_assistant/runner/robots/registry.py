@@ -9,6 +9,7 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.logs import begin
+from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,
@@ -288,6 +289,17 @@ class Robots:
         if isinstance(self._reach, str):
             return ()
         return self._strangers(await self._reach.candidates())
+
+    async def stop_signal(
+        self, name: str, rule: HardwareStop, changed: Callable[[], None]
+    ) -> StopSignal:
+        """Listen to the hardware stop of a robot, as `Reach.stop_signal` does."""
+        if isinstance(self._reach, str):
+            raise RuntimeError(self._reach)
+        registration = self.registration(name)
+        engine = self._engines.get(name)
+        facts = PINNED if engine is None else engine.facts
+        return await self._reach.stop_signal(registration, facts, rule, changed)
 
     async def sighting(self) -> Sighting:
         """Return the engines in sight now that are not registered, and for how many seconds others

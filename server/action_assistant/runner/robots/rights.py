@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from action_assistant.errors import Conflict, Forbidden
 from action_assistant.kit.moments import moment
+from action_assistant.runner.links.hardware_stop import HardwareStop
 from action_assistant.runner.runs.events import Author
 from action_assistant.umrf.limits import Limit, Limits, OverLimit
 from action_assistant.web.auth.identity import Identity
@@ -21,7 +22,7 @@ from action_assistant.web.auth.roles import Permission
 
 #: The codes of refusals, which are those of the items of a pre-flight.
 RightCode: TypeAlias = Literal[
-    "service", "right", "baton", "confirm", "watched", "drill", "released", "limit"
+    "service", "right", "baton", "confirm", "watched", "drill", "released", "limit", "pressed"
 ]
 #: Those that concern the person alone, whatever is started.
 OF_PEOPLE: Final[frozenset[RightCode]] = frozenset({"service", "right", "baton", "confirm"})
@@ -47,7 +48,8 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     the robot, with its hardware stop within reach; `ask_again`: minutes after which a person has to
     confirm again that it is they who start, 0 where nobody is asked; `drill_days`: the last Stop drill
     passed, and is so many days old at most; `released_only`: only versions start there that an owner
-    has released; `limits`: of the numbers that are sent there."""
+    has released; `limits`: of the numbers that are sent there; `hardware_stop`: where it
+    is reported, None where it is not."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
@@ -56,6 +58,7 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     drill_days: int | None = None
     released_only: bool = False
     limits: tuple[Limit, ...] = ()
+    hardware_stop: HardwareStop | None = None
 
 
 class Claim(msgspec.Struct, frozen=True, kw_only=True):

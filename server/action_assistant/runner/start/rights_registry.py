@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, Refused, Unavailable
+from action_assistant.runner.links.hardware_stop import HardwareStop
 from action_assistant.runner.links.port import SIMULATOR, NotSent
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import (
@@ -101,6 +102,8 @@ class RightsRegistry:
         self._gone_at: dict[str, float] = {}  # by person, in seconds of the event loop
         self._began = 0.0
         self._news = anyio.Event()
+        #: Returns why the hardware stop of a robot counts as pressed, as a sentence; "" if it does not.
+        self.why_pressed: Callable[[str], str] = _not_pressed
 
     def take_up(self, rows: Iterable[Row[Any]]) -> None:
         """Take over what is stored, and begin to watch the holders of batons. The time after which a
@@ -149,6 +152,8 @@ class RightsRegistry:
             text = denied.reason if is_asking else f"{who} may not run graphs on robots any more."
             return (Refusal("right", text),)
         found = tuple(record.decided.refusals(current, now, claim=claim, is_asking=is_asking))
+        if why := self.why_pressed(robot):
+            found = (Refusal("pressed", why), *found)
         rules = (record.decided.rules, record.stored.rules)
         if claim is not None and any(each.released_only for each in rules):
             found += self._not_released(robot, claim)
@@ -159,6 +164,10 @@ class RightsRegistry:
         pending = tuple(record.stored.refusals(current, now, claim=claim, is_asking=is_asking))
         text = f"The rights of {robot} are just changing, and that is not stored yet. Try it again."
         return tuple(Refusal(each.code, text) for each in pending[:1])
+
+    def hardware_stop_of(self, robot: str) -> HardwareStop | None:
+        """Return where the hardware stop of a robot is reported; None where it is not."""
+        return self._record(robot).decided.rules.hardware_stop
 
     def limits_of(self, robot: str) -> tuple[Limit, ...]:
         """Return the limits in force on a robot: also those that are just being taken away."""
@@ -257,6 +266,12 @@ class RightsRegistry:
             by = "an owner" if release is None else release.by.name or "an owner"
             text = f"This version was released by {by}."
             found.append(Item(code="released", verdict="passed", text=text))
+        rule = self.hardware_stop_of(robot)
+        if rule is not None and "pressed" not in blocked:
+            text = (
+                f"The hardware stop of {robot} is not pressed: {rule.words()}. This is information."
+            )
+            found.append(Item(code="pressed", verdict="passed", text=text))
         limits = self.limits_of(robot)
         if limits and claim.limits is not None and "limit" not in blocked:
             said = ", ".join(each.words() for each in limits[:_NAMED])
@@ -530,6 +545,11 @@ class RightsRegistry:
             else:
                 wait = min(wait, _POLL_S)
         return wait
+
+
+def _not_pressed(_robot: str) -> str:
+    """Return "": before anybody listens to hardware stops."""
+    return ""
 
 
 def _subject(identity: Identity, is_asking: bool) -> str:

@@ -19,6 +19,7 @@ from rcl_interfaces.msg import Log
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.task import Future
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from temoto_msgs.msg import (
@@ -32,6 +33,7 @@ from temoto_msgs.msg import (
 from temoto_msgs.srv import UmrfGraphGet
 
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
+from action_assistant.runner.links.hardware_stop import TYPES, HardwareStop, StopSignal
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import Command, Feedback
 from action_assistant.runner.links.ros2.message_queue import MessageQueue
@@ -44,6 +46,7 @@ from action_assistant.runner.links.ros2.ros_values import (
     OverheardCommand,
     RosValue,
 )
+from action_assistant.runner.links.ros2.stop_topics import message_type, pressed_in, stop_qos
 
 log: Final = logging.getLogger(__name__)
 
@@ -220,6 +223,20 @@ class Domain:
             time.sleep(0.01)
         raise RuntimeError("the middleware does not show this process to itself")
 
+    def stop_signal(self, rule: HardwareStop, changed: Callable[[], None]) -> StopSignal:
+        """Listen to a hardware stop from now on. `changed` is called on the event loop after a message
+        that says another thing than the one before it. Raise RuntimeError if that is not possible."""
+        kind, read, topic = message_type(rule), pressed_in(rule), rule.full_topic
+        signal = _StopTopic(self._node, topic, TYPES[rule.kind])
+
+        def heard(message: Message) -> None:
+            pressed = read(message)
+            if pressed is not None and signal.hear(pressed=pressed, at=time.monotonic()):
+                self._to_loop(changed)
+
+        self._node.create_subscription(kind, topic, heard, stop_qos())
+        return signal
+
     # --- what comes by itself -----------------------------------------------------------------
 
     def hearing(self, subscriber: Subscriber) -> AbstractContextManager[None]:
@@ -314,6 +331,22 @@ class Domain:
                 self._executor.spin_once()
             except Exception:
                 log.exception("domain %d: a message could not be taken in", self.number)
+
+
+class _StopTopic(StopSignal):
+    """The newest message on a topic of a hardware stop, and who publishes there."""
+
+    def __init__(self, node: Node, topic: str, kind: str) -> None:
+        super().__init__()
+        self._node, self._topic, self._kind = node, topic, kind
+
+    def problem(self) -> str:
+        """Return what is wrong with who publishes, as part of a sentence; "" if nothing is."""
+        ends = self._node.get_publishers_info_by_topic(self._topic)
+        if not ends:
+            return "nobody publishes it"
+        others = {each.topic_type for each in ends} - {self._kind}
+        return f"it is published as {others.pop()}, not as {self._kind}" if others else ""
 
 
 def _absolute(path: str) -> str:

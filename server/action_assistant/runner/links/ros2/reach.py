@@ -11,6 +11,7 @@ import anyio
 import anyio.to_thread
 import rclpy
 
+from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
 from action_assistant.runner.links.port import Candidate, Link, Registration, Sighting
 from action_assistant.runner.links.ros2.domain import Domain
 from action_assistant.runner.links.ros2.link import Ros2Link
@@ -46,6 +47,20 @@ class Ros2:
                 "start the runner with RMW_IMPLEMENTATION set to the robot's"
             )
         return Ros2Link(self.domain, registration, facts, self._clock_us)
+
+    async def stop_signal(
+        self,
+        registration: Registration,
+        facts: EngineFacts,
+        rule: HardwareStop,
+        changed: Callable[[], None],
+    ) -> StopSignal:
+        """Listen to the hardware stop of a robot, as `Domain.stop_signal` does, on the robot's domain.
+        Raise RuntimeError if that is not possible."""
+        if registration.rmw not in {"", self.rmw}:
+            raise RuntimeError(f"this runner does not speak {registration.rmw}")
+        domain = await self.domain(registration.domain, topics_of(facts))
+        return domain.stop_signal(rule, changed)
 
     async def domain(self, number: int, topics: Topics) -> Domain:
         """Return the domain `number`, in which this process takes part with these topics. The first

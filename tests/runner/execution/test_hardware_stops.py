@@ -1,0 +1,211 @@
+"""Hardware stops that robots report: what counts as pressed, what that blocks and stops, what opens again."""
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import anyio
+import pytest
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.rights import Rules
+from action_assistant.runner.runs.events import Held, StopRequested
+from runner.execution.test_conductor import led, shared
+from runner.harness import (
+    ANN,
+    Harness,
+    at_once,
+    clock_us,
+    ended,
+    order,
+    sequence,
+    stand_still,
+    until,
+    virtual,
+)
+from runner.registered_robots import Open, RegisteredRobots
+
+STOP = HardwareStop(topic="estop", age_s=1.0)
+RULES = Rules(hardware_stop=STOP)
+SLOW: dict[str, Any] = {"*": [{"after_s": 60}]}
+
+
+class Topic(StopSignal):
+    """A topic of a hardware stop: `says` is published each 0.2 s; None for nothing."""
+
+    def __init__(self, says: bool | None) -> None:
+        super().__init__()
+        self.says = says
+        self.wrong = ""
+        self.changed: Callable[[], None] = lambda: None
+
+    def problem(self) -> str:
+        """Return what the test says is wrong."""
+        return self.wrong
+
+    async def publish(self) -> None:
+        """Publish until cancelled."""
+        while True:
+            if self.says is not None and self.hear(pressed=self.says, at=anyio.current_time()):
+                self.changed()
+            await anyio.sleep(0.2)
+
+
+class Reached(RegisteredRobots):
+    """Robots of which each has a topic of its hardware stop."""
+
+    def __init__(self, topic: Topic, **robots: Any) -> None:
+        super().__init__(**robots)
+        self.topic = topic
+
+    async def stop_signal(self, *given: Any) -> StopSignal:
+        """Return the topic of all robots."""
+        self.topic.changed = given[-1]
+        return self.topic
+
+
+@asynccontextmanager
+async def lab(topic: Topic, harness: Harness, **robots: Any) -> AsyncIterator[ExecutionService]:
+    """A runner of robots whose hardware stop is listened to."""
+    async with (
+        ExecutionService.opened(
+            harness.journal,
+            Robots(reach=Reached(topic, **robots)),
+            clock_us=clock_us,
+            run_in_worker=at_once,
+        ) as control,
+        anyio.create_task_group() as tasks,
+    ):
+        for name in robots:
+            if name not in control.robots.names:
+                await control.register(Registration(name=name, led=True), ANN)
+            await control.rights.set_rules(name, RULES, ANN)
+        tasks.start_soon(topic.publish)
+        await until(lambda: all(control.robots.robot(name).heard_at for name in robots))
+        await anyio.sleep(2)
+        yield control
+        tasks.cancel_scope.cancel()
+
+
+def pressed(control: ExecutionService) -> str:
+    """Return why David's hardware stop counts as pressed."""
+    return control.robot_view("David").pressed
+
+
+@virtual
+async def test_a_press_stops_the_run_and_a_release_starts_nothing() -> None:
+    topic, harness, david = Topic(says=False), Harness(), Open(SLOW)
+    async with lab(topic, harness, David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        topic.says = True
+        assert await ended(control, run) == "stopped"
+        told = harness.journal.told(run)
+        (asked,) = (each for each in told if isinstance(each, StopRequested))
+        assert (asked.author.id, asked.author.name) == ("runner", "the hardware stop of David")
+        found = harness.journal.history(run)
+        assert [(each.code, each.text) for each in found.alarms] == [
+            ("hardware_stop", "The hardware stop of David is pressed (/estop).")
+        ]
+        with pytest.raises(Conflict, match="The hardware stop of David is pressed") as refused:
+            await control.start(order(sequence(), engine="David"), ANN)
+        assert (refused.value.where or {})["item"] == "pressed"
+        topic.says = False
+        await anyio.sleep(30)
+        assert (pressed(control), len(david.starts), control.open) == ("", 1, {})
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await control.stop(run, ANN)
+        await until(lambda: not control.open)
+
+
+@pytest.mark.parametrize(
+    ("fault", "why"),
+    [
+        ("silent", "the last message on /estop is older than 1 s"),
+        ("wrong", "it is published as std_msgs/msg/String"),
+    ],
+)
+def test_what_nobody_hears_counts_as_pressed(fault: str, why: str) -> None:
+    @virtual
+    async def lives() -> None:
+        topic, harness = Topic(says=False), Harness()
+        async with lab(topic, harness, David=Open(SLOW)) as control:
+            run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+            await until(lambda: control.open[run].run.state == "running")
+            began = anyio.current_time()
+            if fault == "silent":
+                topic.says = None
+            else:
+                topic.wrong = "it is published as std_msgs/msg/String"
+            await until(lambda: control.open[run].run.desired == "stopped")
+            assert anyio.current_time() - began < 1.6
+            assert why in pressed(control)
+            assert await ended(control, run) == "stopped"
+
+    lives()
+
+
+@virtual
+async def test_a_topic_without_any_message_blocks_starts() -> None:
+    async with lab(Topic(says=None), Harness(), David=Open(SLOW)) as control:
+        with pytest.raises(Refused, match="no message has come on /estop"):
+            await control.start(order(sequence(), engine="David"), ANN)
+        await control.rights.set_rules("David", Rules(), ANN)
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await control.stop(run, ANN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_runner_that_begins_to_listen_stops_nothing_before_it_could_hear() -> None:
+    topic, harness = Topic(says=False), Harness()
+    david = Open(SLOW)
+    async with lab(topic, harness, David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+    topic = Topic(says=None)  # the runner is begun again, and its topic is late by four seconds
+    async with lab(topic, harness, David=david) as control:
+        await anyio.sleep(2)
+        topic.says = False
+        await anyio.sleep(10)
+        assert control.open[run].run.desired == "running"
+        topic.says = True
+        assert await ended(control, run) == "stopped"
+
+
+@virtual
+async def test_a_runner_that_stood_still_looks_again_before_it_stops_for_old_messages() -> None:
+    topic = Topic(says=False)
+    async with lab(topic, Harness(), David=Open(SLOW)) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        stand_still(2.5)
+        await anyio.sleep(5)
+        assert control.open[run].run.desired == "running"
+        await control.stop(run, ANN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_press_closes_the_gate_of_a_led_run_and_stops_all_of_its_robots() -> None:
+    topic, harness = Topic(says=False), Harness()
+    script = {"*": [{"after_s": 3}]}
+    david, carol = Open(script), Open(script)
+    async with lab(topic, harness, David=david, Carol=carol) as control:
+        await control.rights.set_rules("Carol", Rules(), ANN)
+        run = (
+            await control.start(led(shared(sequence("task", 4), "Scout", "Carrier")), ANN)
+        ).run.id
+        await until(lambda: len(carol.starts) == 1)
+        topic.says = True
+        assert await ended(control, run) == "stopped"
+        told = harness.journal.told(run)
+        kinds = [type(each) for each in told if isinstance(each, Held | StopRequested)]
+        assert kinds[0] is Held
+        assert StopRequested in kinds
+        assert (len(david.starts), len(carol.starts)) == (1, 1)
+        assert any(each.code == "hardware_stop" for each in harness.journal.history(run).alarms)

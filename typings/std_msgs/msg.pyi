@@ -1,0 +1,3 @@
+class Bool:
+    data: bool
+    def __init__(self, *, data: bool = False) -> None: ...
