@@ -372,13 +372,17 @@ async def test_runs_that_change_while_the_runner_shuts_down_find_no_repeats_to_c
             repeat = await opened(repeats, on_david(times=1))
             run = await pressed(repeats, repeat, 1)
         assert await run_ended(control, run) == "finished"
+        found = (await repeats.find(repeat.id)).closed
+        assert found is not None
+        assert found.why == "restart"
 
 
 STEPS = st.lists(
     st.tuples(
         st.sampled_from(
             [
-                *("press", "press", "press", "reopen", "stop_all", "stop_robot", "stop_run"),
+                *["press"] * 8,
+                *("wait", "wait", "reopen", "reopen", "stop_all", "stop_robot", "stop_run"),
                 *("close", "restart", "wait", "wait", "lost", "baton", "down", "slow"),
             ]
         ),
