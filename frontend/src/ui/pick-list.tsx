@@ -2,7 +2,6 @@
 import { Kbd, TextInput } from "@mantine/core";
 import { IconSearch } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useId, useRef, useState } from "react";
-import { useStableCallback } from "./hooks";
 import { keyOf } from "./keys";
 import style from "./pick-list.module.css";
 import { useTypedAhead } from "./typed-ahead";
@@ -122,21 +121,16 @@ export function PickList(props: Props) {
   const { initial, onEmptyKey } = props;
   const [search, setSearch] = useState(() => initial?.() ?? "");
   const [at, setAt] = useState(0);
-  const [entered, setEntered] = useState(false);
-  useTypedAhead(({ text, end }) => {
+  const field = useRef<HTMLInputElement>(null);
+  useTypedAhead(field, (text) => {
     setSearch(text);
     onSearch?.(text);
-    setEntered(end === "Enter");
   });
   const id = useId();
   const options = find(search);
   const pick = (option: Option | undefined) => {
     if (option && !option.disabled) onPick(option.id);
   };
-  const enter = useStableCallback(() => pick(options[0]));
-  useEffect(() => {
-    if (entered) enter();
-  }, [entered, enter]);
   const onKeyDown = (event: React.KeyboardEvent) => {
     const last = options.length - 1;
     const key = keyOf(event);
@@ -152,6 +146,7 @@ export function PickList(props: Props) {
   return (
     <div className="stack min-h-0">
       <TextInput
+        ref={field}
         autoFocus
         data-autofocus
         leftSection={<IconSearch size={15} aria-hidden />}

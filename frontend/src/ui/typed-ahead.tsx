@@ -1,8 +1,14 @@
 /** Keeps what a person types while the code of a part with a text field is loading. */
-import { type KeyboardEvent, useLayoutEffect, useRef } from "react";
+import {
+  type KeyboardEvent as Press,
+  type RefObject,
+  useLayoutEffect,
+  useRef,
+  useState,
+} from "react";
 import { keyOf } from "./keys";
 
-export interface Typed {
+interface Typed {
   readonly text: string;
   /** The key that was pressed after the text. */
   readonly end: "Enter" | "Escape" | null;
@@ -26,7 +32,7 @@ export function TypingField() {
         typed = NOTHING;
       });
   }, []);
-  const onKeyDown = (event: KeyboardEvent) => {
+  const onKeyDown = (event: Press) => {
     event.stopPropagation();
     const key = keyOf(event);
     if (typed.end === null && (key === "Enter" || key === "Escape")) typed = { ...typed, end: key };
@@ -45,14 +51,25 @@ export function TypingField() {
 }
 
 /**
- * Calls `onTyped` once, before the browser paints the part, if something was typed before it was there. The text is
- * read then and not while the part is rendered: keys are taken until the part is in place.
+ * Calls `onText` once with what was typed before the part was there, and then presses the key that followed in the
+ * part's `field`. What was typed is read before the browser paints the part and not while the part is rendered: keys
+ * are taken until the part is in place.
  */
-export function useTypedAhead(onTyped: (typed: Typed) => void): void {
-  const tell = useRef(onTyped);
+export function useTypedAhead(
+  field: RefObject<HTMLElement | null>,
+  onText: (text: string) => void,
+): void {
+  const tell = useRef(onText);
+  const [end, setEnd] = useState<Typed["end"]>(null);
   useLayoutEffect(() => {
     const taken = typed;
     typed = NOTHING;
-    if (taken !== NOTHING) tell.current(taken);
+    if (taken === NOTHING) return;
+    tell.current(taken.text);
+    setEnd(taken.end);
   }, []);
+  useLayoutEffect(() => {
+    if (end === null) return;
+    field.current?.dispatchEvent(new KeyboardEvent("keydown", { key: end, bubbles: true }));
+  }, [end, field]);
 }

@@ -15,9 +15,8 @@ import {
 import { asOneEdit, connect, insertInto, type NewAction } from "../../graph/edit";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
-import { useStableCallback } from "../../ui/hooks";
 import { keyOf } from "../../ui/keys";
-import { type Typed, useTypedAhead } from "../../ui/typed-ahead";
+import { useTypedAhead } from "../../ui/typed-ahead";
 import { isolated } from "../../words/isolated";
 import style from "./quick-add.module.css";
 
@@ -76,11 +75,8 @@ function placed(context: EditorContext, request: AddRequest, template: NewAction
 
 export function QuickAdd({ context, request, known, onClose }: Props) {
   const [search, setSearch] = useState("");
-  const [ended, setEnded] = useState<Typed["end"]>(null);
-  useTypedAhead(({ text, end }) => {
-    setSearch(text);
-    setEnded(end);
-  });
+  const field = useRef<HTMLInputElement>(null);
+  useTypedAhead(field, setSearch);
   const [at, setAt] = useState(0);
   const list = useMemo(() => candidates(known, search), [known, search]);
   const box = useRef<HTMLDivElement>(null);
@@ -101,10 +97,6 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
     context.view.reveal(cornerOf(context, request));
     onClose();
   };
-  const end = useStableCallback(() => (ended === "Enter" ? choose(list[0], true) : onClose()));
-  useEffect(() => {
-    if (ended !== null) end();
-  }, [ended, end]);
   const onKeyDown = (event: React.KeyboardEvent) => {
     const key = keyOf(event);
     if (key === "Escape") onClose();
@@ -136,6 +128,7 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
         </p>
       )}
       <TextInput
+        ref={field}
         autoFocus
         placeholder="Name of an action"
         leftSection={<IconSearch size={15} aria-hidden />}

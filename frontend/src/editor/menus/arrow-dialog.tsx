@@ -170,7 +170,7 @@ function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string 
   const early = useRef("");
   const tell = useRef(onOutcome);
   tell.current = onOutcome;
-  useTypedAhead(({ text }) => {
+  useTypedAhead(useRef<HTMLElement>(null), (text) => {
     const outcome = OUTCOMES[Number(text[0]) - 1];
     if (outcome) tell.current(outcome);
     early.current = outcome ? text.slice(1) : text;
