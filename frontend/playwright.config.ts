@@ -36,15 +36,20 @@ const NAMED = ["lan.spec.ts", "proxy.spec.ts"];
 /** Files of which each day, by UTC, tries one row, unless a file is named: they are far from STOP, starts and
  * stored edits, or try in other ways what others try. `make soak ARGS=browser` tries all. */
 const TURNS = [
-  ["review", "presence", "history", "extract", "help", "arrows", "phone", "people", "home"],
+  [
+    ...["review", "presence", "history", "extract", "help", "arrows", "phone", "people", "home"],
+    ...["courses", "bends", "imports", "behaviours", "library-pane", "mentions"],
+  ],
   [
     ...["robot-review", "versions", "library", "outline", "identity-provider", "graph-rights"],
-    ...["programs", "touch", "lan", "first-view", "access"],
+    ...["programs", "touch", "lan", "first-view", "access", "administration", "audit"],
+    ...["expanded", "packages", "note-links", "modify-run"],
   ],
   [
     ...["levels", "drafts", "browser-storage", "causes", "yjs-clients", "view-links"],
     ...["wrong-clock", "subgraphs", "problem-fixes", "inspector", "keyboard", "proxy"],
-    ...["led-simulated", "drawing"],
+    ...["led-simulated", "drawing", "review-levels", "two-levels", "viewport"],
+    ...["restored-backup", "library-robots", "robot-drills"],
   ],
 ];
 const takesAll = process.env.TEST_LONG || process.argv.some((word) => word.includes(".spec"));

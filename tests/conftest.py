@@ -71,8 +71,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if item.get_closest_marker("long"):
             item.add_marker(pytest.mark.skip(reason="takes long: `make soak ARGS=long`"))
             continue
-        waits = item.get_closest_marker("turns") and not doses.has_its_turn(item.nodeid)
-        if waits and not files_named:
+        of_turns = item.get_closest_marker("turns") and not doses.has_its_turn(item.nodeid)
+        if (of_turns or doses.waits_with_its_file(item.nodeid)) and not files_named:
             item.add_marker(
                 pytest.mark.skip(
                     reason="has its turn on another day: name its file, or set TEST_DAY"

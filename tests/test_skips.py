@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from support import skips
+from support import doses, skips
 
 TESTS = Path(__file__).parent
 
@@ -53,6 +53,16 @@ def test_ci_fails_when_a_test_is_skipped_for_a_reason_that_nobody_accepted(
     assert "2 tests were skipped: 1 × because; 1 × it is late" in done.stdout
     assert ("CI may not skip this (tests/skips.toml): because" in done.stdout) == ci
     assert done.returncode == int(ci), done.stdout
+
+
+def test_each_file_with_turns_is_tried_on_one_day_of_three(monkeypatch: pytest.MonkeyPatch) -> None:
+    for file in (file for row in doses.FILES for file in row):
+        assert (TESTS.parent / file).is_file(), file
+        tried = []
+        for day in ("0", "1", "2"):
+            monkeypatch.setenv("TEST_DAY", day)
+            tried.append(not doses.waits_with_its_file(f"{file}::test_one"))
+        assert sorted(tried) == [False, False, True], file
 
 
 def test_a_test_with_turns_is_tried_every_third_day_or_when_its_file_is_named(
