@@ -1,5 +1,5 @@
 /** How often a start is carried out, and with which values: chosen in the start dialog. */
-import { Checkbox, NumberInput, Text, Textarea } from "@mantine/core";
+import { Checkbox, Text, Textarea, TextInput } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";
 import { useLocation } from "wouter";
@@ -62,7 +62,7 @@ export function useRepeatChoice(
   place: string,
 ): Choice {
   const [on, setOn] = useState(false);
-  const [times, setTimes] = useState<number | "">(3);
+  const [times, setTimes] = useState("3");
   const [kept, keep] = useKeptText(place);
   const texts: Readonly<Record<string, string>> = kept === "" ? {} : JSON.parse(kept);
   const [seed, setSeed] = useState<number | null>(null);
@@ -74,7 +74,7 @@ export function useRepeatChoice(
   const grid = lines
     .filter(({ values }) => values.length > 0)
     .map(({ asked: { action, name }, values }) => ({ action, name, values }));
-  const rounds = times === "" ? 0 : times;
+  const rounds = /^\d{1,6}$/.test(times.trim()) ? Number(times) : 0;
   const count = grid.reduce((all, { values }) => all * values.length, rounds);
   const wrong = lines.find((each) => each.wrong !== "");
   const obstacle = !on
@@ -97,13 +97,11 @@ export function useRepeatChoice(
       />
       {on && (
         <>
-          <NumberInput
+          <TextInput
             label={shuffle ? "Rounds" : "Times"}
             value={times}
-            min={1}
-            max={MOST}
-            allowDecimal={false}
-            onChange={(value) => setTimes(typeof value === "number" ? value : "")}
+            inputMode="numeric"
+            onChange={(event) => setTimes(event.currentTarget.value)}
           />
           {lines.map(({ asked: each, at, wrong: why }) => (
             <Textarea
