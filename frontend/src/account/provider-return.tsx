@@ -13,7 +13,7 @@ type Visit =
   | { at: "waiting" }
   /** The provider signed nobody in. */
   | { at: "outside"; why: string }
-  /** Somebody who is signed in proves that it is they, or has done so. */
+  /** A person who is signed in proves that it is they, or has done so. */
   | { at: "proving"; done: boolean; why: string };
 
 /** Takes what the provider sent the browser back with; returns how it ended. */

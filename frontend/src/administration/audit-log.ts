@@ -90,7 +90,7 @@ function fetchPage(
 
 export type DroppedRows = NonNullable<AuditPage["dropped"]>;
 
-/** What is known of the log of one process. `backTo`: the instant to which it was read, 0 if to its
+/** The part of the log of one process that is known. `backTo`: the instant to which it was read, 0 if to its
  * begin; `problem`: why it cannot be read; `dropped`: old rows that it has dropped, null for none. */
 export interface ReadLog {
   readonly rows: readonly AuditRow[];

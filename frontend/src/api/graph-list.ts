@@ -64,7 +64,7 @@ function eachOnce(pages: readonly GraphPage[]): GraphSummary[] {
 export interface GraphPages {
   /** Undefined until the first page is there. */
   readonly graphs: readonly GraphSummary[] | undefined;
-  /** How many there are on all pages, also on those that are not loaded. */
+  /** Number of graphs on all pages, also on those that are not loaded. */
   readonly total: number;
   readonly hasMore: boolean;
   readonly isLoadingMore: boolean;

@@ -6,7 +6,7 @@ import { errorText } from "./http";
 import type { EditorApi } from "./schema/editor";
 
 export type Rule = EditorApi["Rule"];
-/** Everybody, or the ids of persons and groups. */
+/** Ids of persons and groups, or everybody. */
 export type Who = Rule["readers"];
 /** `own`: null where the rule of the folder around counts; `around`: the one that counts then. */
 export type RuleView = EditorApi["RuleView"];

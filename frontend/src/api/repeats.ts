@@ -9,7 +9,7 @@ export type Repeat = RunnerApi["RepeatShown"];
 export type RepeatSummary = RunnerApi["RepeatSummary"];
 export type Axis = RunnerApi["Axis"];
 
-/** How often a start is carried out, and with which values. */
+/** Number of times that a start is carried out, and its values. */
 export interface RepeatOrder {
   readonly times: number;
   readonly grid: readonly Axis[];

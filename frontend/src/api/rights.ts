@@ -8,7 +8,7 @@ import type { Robot } from "./robots";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
-/** What the signed-in person may do on a robot. `why`: why they may not start there, "" if they may. */
+/** Rights of the signed-in person on a robot. `why`: why they may not start there, "" if they may. */
 export type RobotRight = RunnerApi["RightShown"];
 export type RightsWanted = Required<RunnerApi["RightsWanted"]>;
 export type ReportedStop = RunnerApi["HardwareStopShown"];

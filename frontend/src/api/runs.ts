@@ -82,11 +82,11 @@ export interface StartOrder {
   watching?: Watching;
   /** Set for a start by which a Stop drill is made. */
   drill?: boolean;
-  /** Where a led run waits. */
+  /** Breakpoints at which a led run waits. */
   breakpoints?: readonly RunBreakpoint[];
-  /** Of the inputs for which the graph asks. */
+  /** Values of the inputs for which the graph asks. */
   values?: NonNullable<Run["values"]>;
-  /** Where it begins, if not at the entry. */
+  /** The place where it begins, if not at the entry. */
   from?: RunnerApi["StartFrom"];
 }
 
@@ -256,7 +256,7 @@ export function letGoOn(
   });
 }
 
-/** How far a held run goes on: one action, or all that come before another one. */
+/** The distance that a held run goes on: one action, or all that come before another one. */
 export type StepGoal = { readonly action: string } | { readonly until: string };
 
 /** Let a held run go on so far, if it is still held since this moment, and hold it again. */

@@ -12,7 +12,7 @@ export type Approval = RunnerApi["Approval"];
 export type AskedInput = RunnerApi["AskedInput"];
 /** Values of a start, by the full name of the action and the flat name of the input. */
 export type StartValues = RunnerApi["ApprovalWanted"]["values"];
-/** Where a start begins, if not at the entry. */
+/** The place where a start begins, if not at the entry. */
 export type StartFrom = RunnerApi["StartFrom"];
 /** All that a start takes for granted then. */
 export type Earlier = RunnerApi["EarlierShown"];

@@ -279,7 +279,7 @@ function Strip(props: StripProps) {
   return <RunDrawer {...props} {...shown} />;
 }
 
-/** What people can do in the run, beside the canvas of a phone. */
+/** Actions of people in the run, beside the canvas of a phone. */
 function Held({ run, past }: { run: Run; past: boolean }) {
   const { point } = useEditorSummary();
   return <RunSteering run={run} point={past ? null : point} />;

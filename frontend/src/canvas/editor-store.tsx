@@ -188,7 +188,7 @@ export class EditorStore {
   readonly openThreads = new Watched<ReadonlyMap<Key, number>>(new Map());
   /** Null while coverage by expected courses is not shown. */
   readonly untaken = new Watched<UntakenPlaces | null>(null);
-  /** Where the run on the canvas waits, else where a led run would: words by action key or relation id. */
+  /** Places where the run on the canvas waits, or where a led run would: words by action key or relation id. */
   readonly breakpoints = new Watched<ReadonlyMap<string, string>>(new Map());
   /** The actions that the focused parameter connects; null while no parameter is focused. */
   readonly touched = new Watched<TouchedActions | null>(null);

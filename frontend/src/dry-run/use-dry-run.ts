@@ -40,7 +40,7 @@ interface GivenValues {
   /** Texts that a person typed, by place; they outlive a change of the layout. */
   readonly edited: Readonly<Record<string, string>>;
   readonly values: StartValues;
-  /** What a person has to do before the graph can be started with values; null if nothing. */
+  /** Text that says what a person has to do before the graph can be started with values; null if nothing. */
   readonly missing: string | null;
 }
 

@@ -69,7 +69,7 @@ export interface Action {
   readonly twin: boolean;
   /** Fields that this model does not know, or known ones whose value does not fit. */
   readonly extra: Extra;
-  /** Where a led run waits, as JSON text; absent: nowhere. No file has it. */
+  /** Breakpoints of led runs, as JSON text; absent: none. No file has it. */
   readonly breakpoint?: JsonText;
   /** The inputs, by path, that its author marks to be asked for at a start, each with its bounds; absent: none. */
   readonly asks?: Extra;
@@ -98,7 +98,7 @@ export interface Relation {
   readonly childrenExtra: Extra;
   /** By response: through which places people have led its line, as JSON text. */
   readonly waypoints: readonly (readonly [response: Response, text: JsonText])[];
-  /** As of an action. */
+  /** Breakpoints, in the form of those of an action. */
   readonly breakpoint?: JsonText;
 }
 

@@ -1,4 +1,4 @@
-/** Where the breakpoints of a run under way can be. Apart from those of graphs, which the editor needs first. Pure. */
+/** Places where a run under way can have breakpoints. Apart from those of graphs, which the editor needs first. Pure. */
 import { type RunBreakpoint, whyNoBreakpoint } from "./breakpoints";
 import { relationId } from "./document-keys";
 import { EXIT, fullName, type Graph, type Key } from "./model";

@@ -118,7 +118,7 @@ export function FolderNameDialog({ opened, ...props }: NameProps & Dialog) {
 }
 
 interface MoveProps {
-  /** Of what is moved. */
+  /** Name of the thing that is moved. */
   name: string;
   /** The folder that it is in; null: in none. */
   from: string | null;

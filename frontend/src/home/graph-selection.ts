@@ -1,4 +1,4 @@
-/** What of the list of graphs is wanted, as the server is asked for it. Pure. */
+/** The part of the list of graphs that is wanted, in the form in which the server is asked for it. Pure. */
 import type { GraphsWanted } from "../api/graph-list";
 import { hasEnded } from "../api/run-stop";
 import type { Run } from "../api/runs";

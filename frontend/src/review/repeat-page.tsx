@@ -103,7 +103,7 @@ function Table({ repeat }: { repeat: Repeat }) {
   );
 }
 
-/** What a person can do: start the next run, close the repeat, open it again. */
+/** Buttons of a person: start the next run, close the repeat, open it again. */
 function Commands({ repeat, runner }: { repeat: Repeat; runner: string }) {
   const client = useQueryClient();
   const moves = repeat.robots.length > 0;

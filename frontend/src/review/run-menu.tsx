@@ -36,7 +36,7 @@ export interface RepeatActions {
   /** The engine of each actor; of a led run. */
   robots?: Run["robots"];
   values?: Run["values"] | undefined;
-  /** Where it begins, if not at the entry. */
+  /** The place where it begins, if not at the entry. */
   beginning?: Beginning | undefined;
 }
 

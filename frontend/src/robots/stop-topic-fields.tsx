@@ -1,4 +1,4 @@
-/** Where a robot reports its hardware stop, as an owner writes it. */
+/** Fields in which an owner says where a robot reports its hardware stop. */
 import {
   Group,
   NumberInput,

@@ -1,4 +1,4 @@
-/** What a run asks of people, and what they can do in it at a place that is chosen on its canvas. */
+/** Questions of a run to people, and what they can do in it at a place that is chosen on its canvas. */
 import { useLive } from "../api/page-link";
 import type { Run } from "../api/runs";
 import { RunQuestions } from "../status/held-notice";

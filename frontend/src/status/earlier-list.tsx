@@ -1,4 +1,4 @@
-/** Where a run begins, if not at the entry, and all that it takes for granted then. */
+/** The place where a run begins, if not at the entry, and all that it takes for granted then. */
 import type { ReactNode } from "react";
 import type { Run } from "../api/runs";
 import type { Earlier, StartFrom } from "../api/starts";
@@ -7,7 +7,7 @@ import { ago, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import style from "./earlier-list.module.css";
 
-/** Where a start begins. `run`, `number`: the earlier run, "" and 0 for none; `at`: full names of the
+/** The place where a start begins. `run`, `number`: the earlier run, "" and 0 for none; `at`: full names of the
  * actions, none if that run is continued where it ended. */
 export interface Beginning {
   readonly run: string;

@@ -1,4 +1,4 @@
-/** What a person can do in a led run at one action or arrow of its graph: wait there, or go on until there. */
+/** Commands of a person for a led run at one action or arrow of its graph: wait there, or go on until there. */
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconHandOff, IconHandStop, IconPlayerTrackNext } from "@tabler/icons-react";

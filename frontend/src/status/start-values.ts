@@ -14,7 +14,7 @@ export function draftOf({ type }: Pick<AskedInput, "type">, value: StartValue | 
   return shown(parameterValueOf(JSON.stringify({ pvf_type: type, pvf_value: value })));
 }
 
-/** What a text of a field comes to. */
+/** The value that the text of a field gives. */
 type Given =
   | { readonly kind: "value"; readonly value: StartValue }
   | { readonly kind: "none" }
@@ -50,7 +50,7 @@ function whyOutside(asked: AskedInput, members: readonly StartValue[]): string {
 }
 
 export interface TypedValues {
-  /** What a start sends: values other than those that the graph has. */
+  /** Values that a start sends: those that differ from the graph's. */
   readonly values: StartValues;
   /** By place: why a text means no value. */
   readonly wrong: ReadonlyMap<string, string>;

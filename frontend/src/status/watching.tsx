@@ -10,7 +10,7 @@ export interface Watch {
   readonly asked: readonly string[];
   /** The words of the person, in the form that the runner takes. */
   readonly watching: Readonly<Record<string, true>>;
-  /** Why nothing may be set going yet; null when all is said. */
+  /** The reason why nothing may be set going yet; null when all is said. */
   readonly obstacle: string | null;
   readonly toggle: (robot: string) => void;
   /** Forgets what was said: it counts for one start, resume or change. */

@@ -3,7 +3,7 @@ import { Button } from "@mantine/core";
 import style from "./confirm-row.module.css";
 
 interface Props {
-  /** What happens when the person goes on. */
+  /** Text that says what happens when the person goes on. */
   children: string;
   action: string;
   loading: boolean;

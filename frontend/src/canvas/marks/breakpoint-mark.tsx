@@ -5,7 +5,7 @@ interface BreakpointMarkProps {
   /** The action or relation that has it. */
   of: string;
   on: "card" | "arrow";
-  /** What it does. */
+  /** Text that says what it does. */
   words: string;
 }
 

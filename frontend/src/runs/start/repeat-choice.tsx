@@ -1,4 +1,4 @@
-/** How often a start is carried out, and with which values: chosen in the start dialog. */
+/** Choice in the start dialog of how often a start is carried out, and with which values. */
 import { Checkbox, Text, Textarea, TextInput } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";

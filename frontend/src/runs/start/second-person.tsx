@@ -22,7 +22,7 @@ interface SecondPersonProps {
   graph: string;
   label: string;
   looks: readonly Preflight[] | undefined;
-  /** Of the start; part of what is said yes to. */
+  /** Values of the start; they are part of what is said yes to. */
   values: StartValues;
   /** The question whose values these are. */
   taken: ApprovalWanted | null;

@@ -58,7 +58,7 @@ interface Props {
   robots?: LedOrder["robots"] | null | undefined;
   /** Values to begin with: of the run that is started once more. */
   values?: StartValues | undefined;
-  /** Where it begins, if not at the entry. */
+  /** The place where it begins, if not at the entry. */
   beginning?: Beginning | undefined;
   onChosen: (engines: string[]) => void;
   onStarted?: (runs: readonly Run[]) => void;

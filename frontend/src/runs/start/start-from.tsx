@@ -14,9 +14,9 @@ const TYPING = 400; // ms without a key until it is looked at
 const isWord = (choice: Choice | undefined) => choice !== "again" && choice !== "leave";
 
 export interface StartFromChoice {
-  /** As it is looked at and sent; undefined for the entry. */
+  /** The place in the form in which it is looked at and sent; undefined for the entry. */
   readonly from: StartFrom | undefined;
-  /** What is needed before anything is started; null if nothing is. */
+  /** Text that says what is needed before anything is started; null if nothing is. */
   obstacle(earlier: Earlier | null | undefined): string | null;
   /** Forgets the reason, once it was sent. */
   forget(): void;

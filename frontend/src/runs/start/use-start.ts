@@ -36,11 +36,11 @@ export interface StartInput {
   watching?: Watching;
   /** Set for a start by which a Stop drill is made. */
   drill?: boolean;
-  /** Where a led run waits. */
+  /** Breakpoints at which a led run waits. */
   breakpoints?: readonly RunBreakpoint[];
-  /** Of the inputs for which the graph asks. */
+  /** Values of the inputs for which the graph asks. */
   values?: StartValues;
-  /** Where it begins, if not at the entry. */
+  /** The place where it begins, if not at the entry. */
   from?: StartFrom | undefined;
 }
 
