@@ -61,13 +61,16 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
         assert why in said("rights", "David", "--limit", wrong, code=1)
     assert "torque" not in said("rights", "David", "--no-limits")
     shown = said("rights", "David", "--stop-topic", "/estop", "--stop-age", "0.5")
-    assert "the hardware stop of David is reported on /estop" in shown
+    assert "the hardware stop of David is pressed: true on /estop, 0.5 s old at most" in shown
+    assert "false on /estop, 0.5 s" in said("rights", "David", "--stop-pressed", "false")
+    assert "false on /estop, 2 s" in said("rights", "David", "--stop-age", "2")
     assert "counts as pressed" in said("rights", "David", "--watched", "off")  # nobody publishes
     assert "no name of a ROS 2 topic" in said("rights", "David", "--stop-topic", "a b", code=1)
     assert "0.1 to 3600 s" in said(
         "rights", "David", "--stop-topic", "a", "--stop-age", "0", code=1
     )
     assert "estop" not in said("rights", "David", "--stop-topic", "")
+    assert "Name the topic" in said("rights", "David", "--stop-age", "2", code=1)
     assert main(["robots", "drill", "David"]) == 1  # none was ever made
     assert "There is no such run" in said(
         *("drill", "David", "--run", "x", "--saw-it-stop", "yes", "--hardware-stop", "no"), code=1

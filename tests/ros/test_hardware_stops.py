@@ -113,6 +113,8 @@ def test_a_bool_blocks_stops_and_opens_nothing(domain: int) -> None:
                 with pytest.raises(Refused, match="The hardware stop of David is pressed"):
                     await control.start(order(sequence(), engine="David"), ANN)
                 topic.now(Bool(data=False))
+                with publishing(domain, Bool, Bool(data=False)):
+                    await until(lambda: "2 programs publish it" in pressed(control), 10)
                 run = await moving(control)
                 topic.says = lambda: None  # nothing more comes
                 began = time.monotonic()

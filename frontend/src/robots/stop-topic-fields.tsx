@@ -87,8 +87,9 @@ export function StopTopicFields({ stop, onChange }: Props) {
             <Group grow align="end">
               <TextInput
                 size="xs"
-                label="Status"
-                placeholder="every"
+                label="Name of the status"
+                placeholder="David: stop"
+                required
                 value={stop.status}
                 maxLength={200}
                 onChange={(event) => put({ status: event.currentTarget.value })}

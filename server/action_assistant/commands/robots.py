@@ -12,6 +12,7 @@ import msgspec
 
 from action_assistant.commands.client import Server, command, decoded, print_json, running
 from action_assistant.errors import CannotStart, RequestRefused
+from action_assistant.runner.links.hardware_stop import HardwareStop
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import SECOND_PERSON
 
@@ -139,7 +140,7 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         help="the Bool that means pressed; default: true",
     )
     rights.add_argument(
-        "--stop-status", metavar="NAME", help="the status that counts; default: every one"
+        "--stop-status", metavar="NAME", help="the status that counts, of diagnostics"
     )
     rights.add_argument(
         "--stop-level", type=int, metavar="N", help="the level from which it does; default: 2"
@@ -258,12 +259,13 @@ def _rights(options: argparse.Namespace) -> int:
         robot = _robot(server, options.name)
         if options.all and options.operator:
             raise RequestRefused("Say --all or --operator, not both.")
+        stop = (options.stop_topic, *_stop_details(options).values())
         rules = (
             *(options.baton, options.watched, options.released_only, options.drill_days),
             options.ask_again,
             options.limit,
             options.no_limits or None,
-            options.stop_topic,
+            *stop,
         )
         if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
@@ -283,8 +285,8 @@ def _rights(options: argparse.Namespace) -> int:
             }
             if options.limit or options.no_limits:
                 wanted["limits"] = [_limit(each) for each in options.limit or ()]
-            if options.stop_topic is not None:
-                wanted["hardware_stop"] = _hardware_stop(options)
+            if any(each is not None for each in stop):
+                wanted["hardware_stop"] = _hardware_stop(options, robot)
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
     print(one_line(f"{robot.name}: {_operators_text(robot)}"))
@@ -309,7 +311,8 @@ def _rules_texts(robot: "Robot") -> list[str]:
         said.append(f"only released versions start on {robot.name}")
     said += [f"{each.words()} on {robot.name}" for each in robot.limits]
     if robot.hardware_stop is not None:
-        said.append(f"the hardware stop of {robot.name} is reported on {robot.hardware_stop.topic}")
+        rule = HardwareStop(**msgspec.structs.asdict(robot.hardware_stop))
+        said.append(f"the hardware stop of {robot.name} is pressed: {rule.words()}")
         said.append(robot.pressed or "it is not pressed")
     if robot.drill_days is not None:
         said.append(f"a Stop drill of {robot.name} counts for {robot.drill_days} days")
@@ -377,19 +380,29 @@ def _limit(asked: str) -> dict[str, Any]:
     return {"parameter": parameter, "action": action, **found}
 
 
-def _hardware_stop(options: argparse.Namespace) -> dict[str, Any] | None:
-    """Return where a hardware stop is reported; None for nowhere."""
-    given = {
+def _stop_details(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options say of a hardware stop besides its topic; None for what they leave out."""
+    return {
         "kind": options.stop_kind,
         "age_s": options.stop_age,
         "pressed": None if options.stop_pressed is None else options.stop_pressed == "true",
         "status": options.stop_status,
         "level": options.stop_level,
     }
-    if not options.stop_topic:
+
+
+def _hardware_stop(options: argparse.Namespace, robot: "Robot") -> dict[str, Any] | None:
+    """Return where the hardware stop of a robot is reported from now on, None for nowhere: what the options
+    leave out stays as it is. Raise RequestRefused if there is no topic."""
+    if options.stop_topic == "":
         return None
-    named = {name: value for name, value in given.items() if value is not None}
-    return {"topic": options.stop_topic, **named}
+    now = robot.hardware_stop
+    before = {} if now is None else msgspec.structs.asdict(now)
+    named = {name: value for name, value in _stop_details(options).items() if value is not None}
+    topic = options.stop_topic or before.get("topic")
+    if topic is None:
+        raise RequestRefused(f"Name the topic of the hardware stop of {robot.name}: --stop-topic.")
+    return {**before, **named, "topic": topic}
 
 
 def _names(server: Server) -> dict[str, str]:

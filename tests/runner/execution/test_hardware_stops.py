@@ -5,12 +5,14 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import anyio
+import msgspec
 import pytest
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
 from action_assistant.runner.links.port import Registration
+from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Held, StopRequested
@@ -28,6 +30,8 @@ from runner.harness import (
     virtual,
 )
 from runner.registered_robots import Open, RegisteredRobots
+from runner.repeats.test_repeats import closed, on_david, opened
+from runner.repeats.test_repeats import pressed as pressed_next
 
 STOP = HardwareStop(topic="estop", age_s=1.0)
 RULES = Rules(hardware_stop=STOP)
@@ -41,6 +45,7 @@ class Topic(StopSignal):
         super().__init__()
         self.says = says
         self.wrong = ""
+        self.domains: list[int] = []
         self.changed: Callable[[], None] = lambda: None
 
     def problem(self) -> str:
@@ -65,6 +70,7 @@ class Reached(RegisteredRobots):
     async def stop_signal(self, *given: Any) -> StopSignal:
         """Return the topic of all robots."""
         self.topic.changed = given[-1]
+        self.topic.domains.append(given[0].domain)
         return self.topic
 
 
@@ -120,6 +126,71 @@ async def test_a_press_stops_the_run_and_a_release_starts_nothing() -> None:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
         await control.stop(run, ANN)
         await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_press_too_short_to_be_seen_stops_the_run() -> None:
+    topic, harness = Topic(says=False), Harness()
+    async with lab(topic, harness, David=Open(SLOW)) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        for says in (True, False):  # in one step of the loop
+            topic.hear(pressed=says, at=anyio.current_time())
+        topic.changed()
+        assert await ended(control, run) == "stopped"
+        found = harness.journal.history(run)
+        assert [each.text for each in found.alarms] == [
+            "The hardware stop of David was pressed for a moment."
+        ]
+
+
+@virtual
+async def test_a_press_between_two_runs_closes_a_repeat_which_a_release_does_not_open() -> None:
+    topic, harness = Topic(says=False), Harness()
+    async with (
+        lab(topic, harness, David=Open({})) as control,
+        Repeats.opened(
+            control, harness.journal, clock_us=clock_us, run_in_worker=at_once
+        ) as repeats,
+    ):
+        repeat = await opened(repeats, on_david())
+        topic.says = True
+        assert await closed(repeats, repeat) == "stop"
+        found = await repeats.find(repeat.id)
+        assert found.closed is not None
+        assert found.closed.text == "David was stopped by the hardware stop of David."
+        topic.says = False
+        await anyio.sleep(5)
+        with pytest.raises(Conflict, match="This repeat is closed"):
+            await pressed_next(repeats, repeat, 1)
+        assert control.open == {}
+
+
+@virtual
+async def test_a_robot_in_another_domain_is_listened_to_there() -> None:
+    topic = Topic(says=False)
+    async with lab(topic, Harness(), David=Open(SLOW)) as control:
+        assert pressed(control) == ""
+        asked = len(topic.domains)
+        await control.register(Registration(name="David", led=True, domain=5), ANN)
+        assert "it is not listened to yet" in pressed(control)
+        await until(lambda: pressed(control) == "")
+        assert topic.domains[asked:] == [5]
+        await control.remove("David", ANN)
+        await control.register(Registration(name="David", led=True, domain=7), ANN)
+        await until(lambda: pressed(control) == "")
+        assert topic.domains[-1] == 7
+
+
+@virtual
+async def test_a_runner_that_begins_while_the_stop_is_pressed_stops_what_it_takes_over() -> None:
+    topic, harness, david = Topic(says=False), Harness(), Open(SLOW)
+    async with lab(topic, harness, David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+    async with lab(Topic(says=True), harness, David=david) as control:
+        await until(lambda: run not in control.open)
+        assert harness.journal.history(run).state == "stopped"
 
 
 @pytest.mark.parametrize(
@@ -209,3 +280,9 @@ async def test_a_press_closes_the_gate_of_a_led_run_and_stops_all_of_its_robots(
         assert StopRequested in kinds
         assert (len(david.starts), len(carol.starts)) == (1, 1)
         assert any(each.code == "hardware_stop" for each in harness.journal.history(run).alarms)
+
+
+def test_a_topic_of_diagnostics_needs_the_name_of_the_status() -> None:
+    rule = HardwareStop(topic="/diagnostics", kind="diagnostics")
+    assert "Name the status" in rule.fault
+    assert msgspec.structs.replace(rule, status="estop").fault == ""

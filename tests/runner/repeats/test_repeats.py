@@ -127,6 +127,9 @@ def test_a_grid_has_a_run_for_each_combination_in_each_round_and_a_seed_shuffles
         cells_of(RepeatRequest(start=start, times=200, grid=(PLACES, TORQUES)))
     with pytest.raises(BadInput, match="has a value already"):
         cells_of(RepeatRequest(start=start, grid=(PLACES, PLACES)))
+    large = msgspec.structs.replace(start, values={"Work_1": {"place": "x" * 1_000_000}})
+    with pytest.raises(BadInput, match="200,000 bytes at most"):  # before 500 copies are made
+        cells_of(RepeatRequest(start=large, times=500))
 
 
 @virtual

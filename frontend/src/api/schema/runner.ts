@@ -990,8 +990,8 @@ export interface RunnerApi {
     /**
      * HardwareStopShown
      * @description Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
-     *     Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
-     *     every status) at this `level` or above means pressed.
+     *     Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, the status with the name `status`
+     *     at this `level` or above means pressed.
      */
     HardwareStopShown: {
         topic: string;

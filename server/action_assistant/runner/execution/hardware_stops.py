@@ -11,8 +11,9 @@ from typing import Final
 
 import anyio
 
-from action_assistant.errors import Refused
+from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
+from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runtime import Runtime
 
@@ -26,12 +27,16 @@ _AGAIN_S: Final = 5.0
 
 
 class _Watched:
-    """A hardware stop that is listened to since `since`, in monotonic seconds. `is_told`: it counts as
-    pressed, and that was acted on; `was_clear`: it did not at some time; `shown`: why, as it was shown."""
+    """A hardware stop that is listened to since `since`, in monotonic seconds. `place`: the registration of
+    its robot, which says in which domain. `is_told`: it counts as pressed, and that was acted on; `knew`:
+    what runs on the robot was known then; `presses`: those acted on; `was_clear`: it did not count
+    as pressed at some time; `shown`: why, as it was shown."""
 
-    def __init__(self, robot: str, rule: HardwareStop, since: float) -> None:
-        self.robot, self.rule, self.since = robot, rule, since
+    def __init__(self, place: Registration, rule: HardwareStop, since: float) -> None:
+        self.robot, self.place, self.rule, self.since = place.name, place, rule, since
         self.signal: StopSignal | None = None
+        self.presses = 0
+        self.knew = False
         self.problem = "it is not listened to yet"
         self.looked_at = since - _PROBLEM_S
         self.is_told = self.was_clear = False
@@ -51,10 +56,18 @@ class _Watched:
             return f"{name} counts as pressed: the last message on {topic} is older than {self.rule.age_s:g} s."
         return ""
 
+    @property
+    def signal_says_pressed(self) -> bool:
+        """True if the newest message means pressed."""
+        return self.signal is not None and self.signal.pressed is True
+
     def counts(self, now: float) -> bool:
         """Return whether what counts as pressed stops the robot too: not silence at the begin."""
-        is_said = self.signal is not None and self.signal.pressed is True
-        return is_said or self.was_clear or now - self.since >= max(_BEGIN_S, self.rule.age_s)
+        return (
+            self.signal_says_pressed
+            or self.was_clear
+            or now - self.since >= max(_BEGIN_S, self.rule.age_s)
+        )
 
 
 class HardwareStops:
@@ -85,7 +98,7 @@ class HardwareStops:
         if rule is None:
             return ""
         watched = self._watched.get(robot)
-        if watched is None or watched.rule != rule:
+        if watched is None or not self._is_so(watched, rule):
             return f"The hardware stop of {robot} counts as pressed: it is not listened to yet."
         return watched.why(anyio.current_time())
 
@@ -112,37 +125,68 @@ class HardwareStops:
     def _look(self, now: float, *, is_stalled: bool) -> bool:
         rules = {name: rule for name in self._robots.names if (rule := self._rule_of(name))}
         for name in self._watched.keys() - rules.keys():
-            del self._watched[name]
+            self._leave(name)
         for name, rule in rules.items():
             watched = self._watched.get(name)
-            if watched is None or watched.rule != rule:
-                watched = self._watched[name] = _Watched(name, rule, now)
+            if watched is None or not self._is_so(watched, rule):
+                self._leave(name)
+                watched = _Watched(self._robots.registration(name), rule, now)
+                self._watched[name] = watched
                 self._runtime.tasks.start_soon(self._listen, watched)
             self._look_at(watched, now, is_stalled=is_stalled)
         return bool(rules)
+
+    def _is_so(self, watched: _Watched, rule: HardwareStop) -> bool:
+        """Return whether a hardware stop is still listened to where the rule and the registration say."""
+        try:
+            return watched.rule == rule and watched.place == self._robots.registration(
+                watched.robot
+            )
+        except NotFound:
+            return False
+
+    def _leave(self, robot: str) -> None:
+        watched = self._watched.pop(robot, None)
+        if watched is not None and watched.signal is not None:
+            watched.signal.close()
 
     def _look_at(self, watched: _Watched, now: float, *, is_stalled: bool) -> None:
         if watched.signal is not None and now - watched.looked_at >= _PROBLEM_S:
             watched.looked_at = now
             watched.problem = watched.signal.problem()
         why = watched.why(now)
+        if watched.signal is not None and watched.signal.presses != watched.presses:
+            watched.presses = watched.signal.presses
+            self._act(
+                watched, why or f"The hardware stop of {watched.robot} was pressed for a moment."
+            )
+        elif why and watched.counts(now):
+            is_new = not watched.is_told or (not watched.knew and self._knows(watched.robot))
+            if is_new and (watched.signal_says_pressed or not is_stalled):
+                self._act(watched, why)
         if not why:
             watched.is_told, watched.was_clear = False, True
-        elif not watched.is_told and watched.counts(now):
-            is_said = watched.signal is not None and watched.signal.pressed is True
-            if is_said or not is_stalled:
-                watched.is_told = True
-                self._pressed(watched.robot, why)
         if why != watched.shown:
             watched.shown = why
             self._changed(watched.robot)
 
+    def _act(self, watched: _Watched, why: str) -> None:
+        watched.is_told, watched.knew = True, self._knows(watched.robot)
+        self._pressed(watched.robot, why)
+
+    def _knows(self, robot: str) -> bool:
+        """Return whether the engine of a robot has answered, so that what runs there is known."""
+        engine = self._robots.link(robot)
+        return engine is not None and engine.answer is not None
+
     async def _listen(self, watched: _Watched) -> None:
         while watched.signal is None and self._watched.get(watched.robot) is watched:
             try:
-                watched.signal = await self._robots.stop_signal(
-                    watched.robot, watched.rule, self.look
-                )
+                signal = await self._robots.stop_signal(watched.robot, watched.rule, self.look)
+                if self._watched.get(watched.robot) is not watched:
+                    signal.close()
+                    return
+                watched.signal = signal
             except (RuntimeError, Refused) as error:  # without a link, a package, a domain
                 watched.problem = str(error).rstrip(". ") or repr(error)
                 self.look()

@@ -235,6 +235,7 @@ class ExecutionService:
         self._robot_watchers.append(watcher)
 
     def _robots_changed(self) -> None:
+        self.hardware_stops.look()
         for watcher in self._robot_watchers:
             watcher()
 
@@ -243,6 +244,7 @@ class ExecutionService:
         begin to stop them and what others have started there."""
         author = msgspec.structs.replace(RUNNER, name=f"the hardware stop of {robot}")
         self._stops.note(robot, author)
+        self._tell_of_stop(author, robot, "")
         self._conductors.rights_changed(robot)
         going = {
             run: opened
@@ -611,7 +613,6 @@ class ExecutionService:
         self.rights.take_up(await self._runtime.journal.query(queries.all_rights()))
         for row in await self._runtime.journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
-        self._runtime.tasks.start_soon(self.hardware_stops.run)
         for row in await self._runtime.journal.query(queries.open_runs()):
             run, seq, is_whole = await self.history.left(row.id)
             if run is None:
@@ -622,6 +623,8 @@ class ExecutionService:
                 continue
             await self._adopt(run, seq, is_whole=is_whole)
         await self.foreign_stops.take_up()
+        # Until here each robot with a hardware stop counts as pressed; what a press stops is known now.
+        self._runtime.tasks.start_soon(self.hardware_stops.run)
 
     async def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is

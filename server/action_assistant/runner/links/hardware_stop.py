@@ -19,8 +19,8 @@ _LONGEST_AGE_S: Final = 3600.0
 
 class HardwareStop(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
-    Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
-    every status) at this `level` or above means pressed."""
+    Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, the status with the name `status`
+    at this `level` or above means pressed."""
 
     topic: str
     kind: SignalKind = "bool"
@@ -36,6 +36,8 @@ class HardwareStop(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
             return "This is no name of a ROS 2 topic."
         if not isfinite(self.age_s) or not 0.1 <= self.age_s <= _LONGEST_AGE_S:
             return f"The age of a message is 0.1 to {_LONGEST_AGE_S:.0f} s."
+        if self.kind == "diagnostics" and not self.status:
+            return "Name the status: a topic of diagnostics has those of many programs."
         return ""
 
     @property
@@ -48,23 +50,29 @@ class HardwareStop(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
         if self.kind == "bool":
             what = str(self.pressed).lower()
         else:
-            what = f"{self.status or 'a status'} at level {self.level} or above"
+            what = f"{self.status} at level {self.level} or above"
         return f"{what} on {self.full_topic}, {self.age_s:g} s old at most"
 
 
 class StopSignal:
     """The newest message of a hardware stop, as the thread that receives messages writes it. `pressed`:
-    None before the first one; `at`: when it came, in monotonic seconds."""
+    None before the first one; `at`: when it came, in monotonic seconds; `presses`: how often the stop
+    was pressed so far, so that a short press is not missed."""
 
     def __init__(self) -> None:
         self.pressed: bool | None = None
         self.at = -inf
+        self.presses = 0
 
     def hear(self, *, pressed: bool, at: float) -> bool:
         """Note a message; return whether it says another thing than the one before it."""
         is_news = pressed is not self.pressed
+        self.presses += is_news and pressed
         self.at, self.pressed = at, pressed
         return is_news
+
+    def close(self) -> None:
+        """Receive no more messages of this topic."""
 
     def problem(self) -> str:
         """Return what is wrong with who publishes, as part of a sentence; "" if nothing is."""

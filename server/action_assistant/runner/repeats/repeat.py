@@ -23,7 +23,7 @@ from action_assistant.umrf.start_values import StartValues, Value, WrongValue, w
 
 #: The most cells of one repeat.
 MOST: Final = 500
-_MOST_BYTES: Final = 1_000_000  # of the values of all cells
+_MOST_BYTES: Final = 200_000  # of the values of all cells
 _PREFIX: Final = "repeat/"
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
@@ -241,6 +241,9 @@ def cells_of(request: RepeatRequest) -> tuple[StartValues, ...]:
     if count > MOST:
         where: dict[str, object] = {"path": "/grid" if request.grid else "/times"}
         raise BadInput(f"A repeat has at most {MOST} runs; these are {count:,}.", where=where)
+    if count * len(as_json(request.start.values)) + _grid_bytes(request.grid, count) > _MOST_BYTES:
+        text = f"The values of a repeat have {_MOST_BYTES:,} bytes at most."
+        raise BadInput(text, where={"path": "/grid"})
     grid = [
         _given(request.start.values, request.grid, values)
         for values in itertools.product(*(axis.values for axis in request.grid))
@@ -249,10 +252,16 @@ def cells_of(request: RepeatRequest) -> tuple[StartValues, ...]:
     cells: list[StartValues] = []
     for _ in range(request.times):
         cells += grid if chance is None else chance.sample(grid, len(grid))
-    if len(as_json(cells)) > _MOST_BYTES:
-        text = f"The values of a repeat have {_MOST_BYTES:,} bytes at most."
-        raise BadInput(text, where={"path": "/grid"})
     return tuple(cells)
+
+
+def _grid_bytes(grid: Sequence[Axis], count: int) -> int:
+    """Return how many bytes the values of a grid are in `count` cells, as JSON."""
+    return sum(
+        count // len(axis.values) * sum(len(as_json(value)) for value in axis.values)
+        + count * (len(axis.action) + len(axis.name))
+        for axis in grid
+    )
 
 
 def _given(values: StartValues, grid: Sequence[Axis], chosen: Sequence[Value]) -> StartValues:

@@ -12,11 +12,13 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 import anyio
+import anyio.lowlevel
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused, Unavailable
 from action_assistant.kit.clock import ClockUs
 from action_assistant.kit.lru_cache import LruCache
+from action_assistant.runner.execution.conducted_steps import RUNNER
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.execution.start_pipeline import Started
@@ -176,6 +178,7 @@ class Repeats:
             by_stream.setdefault(row.stream, []).insert(0, (row.kind, row.body))
         found: list[Repeat] = []
         for events in by_stream.values():
+            await anyio.lowlevel.checkpoint()  # they may be large
             try:
                 repeat = replay(events)
             except msgspec.DecodeError:
@@ -465,7 +468,10 @@ class Repeats:
         for record in tuple(self._records.values()):
             if robot in record.robots if robot else not run or run in record.runs.values():
                 what = f" of {robot}" if robot else "" if run else " of everything"
-                self._meet(record, _Reason("stop", f"{who} pressed Stop{what}.", author, run))
+                text = f"{who} pressed Stop{what}."
+                if author.id == RUNNER.id:
+                    text = f"{robot} was stopped by {who}."
+                self._meet(record, _Reason("stop", text, author, run))
 
     def _run_changed(self, opened: OpenRun) -> None:
         run = opened.run
@@ -548,7 +554,7 @@ class Repeats:
         """Store that the repeats are closed which an earlier process left open. None of them goes on,
         also where that cannot be stored."""
         newest: dict[str, str] = {}
-        for row in await self._journal.query(queries.repeats(StartKept.kind)):
+        for row in await self._journal.query(queries.kinds_of_repeats(StartKept.kind)):
             newest.setdefault(row.stream, row.kind)
         event = RepeatClosed(at=self._clock_us(), why="restart", text=_RESTARTED)
         for stream, kind in newest.items():

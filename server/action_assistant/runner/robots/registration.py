@@ -122,8 +122,8 @@ class DrillShown(msgspec.Struct, frozen=True, kw_only=True):
 
 class HardwareStopShown(msgspec.Struct, frozen=True, kw_only=True):
     """Names the topic on which a robot reports its hardware stop. `age_s`: seconds after which the newest message is too old.
-    Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, a status with this name ("" for
-    every status) at this `level` or above means pressed."""
+    Of `bool`, `pressed` is the value that means pressed; of `diagnostics`, the status with the name `status`
+    at this `level` or above means pressed."""
 
     topic: str
     kind: SignalKind

@@ -111,6 +111,16 @@ def repeats(but: str, newest: int | None = None) -> Select[Any]:
     return chosen.order_by(event.position.desc()).limit(newest)
 
 
+def kinds_of_repeats(but: str) -> Select[Any]:
+    """Select stream and kind of the events of all repeats, the newest first, without those of the
+    kind `but`."""
+    event = runner_event.c
+    chosen = select(event.stream, event.kind).where(
+        event.stream > "repeat/", event.stream < "repeat0", event.kind != but
+    )
+    return chosen.order_by(event.position.desc())
+
+
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
     """The wanted runs; None in a field means any. `failed`: true for runs that were refused, lost,
     halted, or ended in error; false for other ended runs. `graph`: id or name; `person`: id or

@@ -155,6 +155,9 @@ class RightsRegistry:
         if why := self.why_pressed(robot):
             found = (Refusal("pressed", why), *found)
         rules = (record.decided.rules, record.stored.rules)
+        if rules[0].hardware_stop != rules[1].hardware_stop:
+            text = f"Where {robot} reports its hardware stop is just changing, and not stored yet."
+            found = (Refusal("pressed", text), *found)
         if claim is not None and any(each.released_only for each in rules):
             found += self._not_released(robot, claim)
         if claim is not None:

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Final, TypeAlias, TypeVar
+from typing import Any, Final, TypeAlias, TypeVar
 
 import rclpy
 from rcl_interfaces.msg import Log
@@ -82,6 +82,7 @@ class Domain:
         self._loop = loop
         self._clock_us = clock_us
         self._subscribers = Listeners[RosValue]()
+        self._stop_listeners: dict[tuple[str, str], tuple[Callable[[Any], None], ...]] = {}
         self._waiting = MessageQueue()
         self._handing: set[asyncio.Task[None]] = set()
         self._leaving = False
@@ -227,14 +228,27 @@ class Domain:
         """Listen to a hardware stop from now on. `changed` is called on the event loop after a message
         that says another thing than the one before it. Raise RuntimeError if that is not possible."""
         kind, read, topic = message_type(rule), pressed_in(rule), rule.full_topic
-        signal = _StopTopic(self._node, topic, TYPES[rule.kind])
+        place = topic, TYPES[rule.kind]
 
         def heard(message: Message) -> None:
             pressed = read(message)
             if pressed is not None and signal.hear(pressed=pressed, at=time.monotonic()):
                 self._to_loop(changed)
 
-        self._node.create_subscription(kind, topic, heard, stop_qos())
+        def leave() -> None:
+            self._stop_listeners[place] = tuple(
+                each for each in self._stop_listeners[place] if each is not heard
+            )
+
+        def share(message: Message) -> None:
+            for listener in self._stop_listeners[place]:
+                listener(message)
+
+        signal = _StopTopic(self._node, *place, leave)
+        if place not in self._stop_listeners:
+            self._stop_listeners[place] = ()
+            self._node.create_subscription(kind, topic, share, stop_qos())
+        self._stop_listeners[place] += (heard,)
         return signal
 
     # --- what comes by itself -----------------------------------------------------------------
@@ -336,9 +350,10 @@ class Domain:
 class _StopTopic(StopSignal):
     """The newest message on a topic of a hardware stop, and who publishes there."""
 
-    def __init__(self, node: Node, topic: str, kind: str) -> None:
+    def __init__(self, node: Node, topic: str, kind: str, leave: Callable[[], None]) -> None:
         super().__init__()
         self._node, self._topic, self._kind = node, topic, kind
+        self.close = leave  # type: ignore[method-assign]
 
     def problem(self) -> str:
         """Return what is wrong with who publishes, as part of a sentence; "" if nothing is."""
@@ -346,7 +361,11 @@ class _StopTopic(StopSignal):
         if not ends:
             return "nobody publishes it"
         others = {each.topic_type for each in ends} - {self._kind}
-        return f"it is published as {others.pop()}, not as {self._kind}" if others else ""
+        if others:
+            return f"it is published as {others.pop()}, not as {self._kind}"
+        if self._kind == TYPES["bool"] and len(ends) > 1:
+            return f"{len(ends)} programs publish it, and the newest message need not be the stop's"
+        return ""
 
 
 def _absolute(path: str) -> str:

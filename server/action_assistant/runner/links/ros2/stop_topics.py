@@ -32,7 +32,7 @@ def pressed_in(rule: HardwareStop) -> Callable[[Any], bool | None]:
         levels = [
             int.from_bytes(each.level, "little") if isinstance(each.level, bytes) else each.level
             for each in message.status
-            if rule.status in ("", each.name)
+            if each.name == rule.status
         ]
         return max(levels) >= rule.level if levels else None
 
