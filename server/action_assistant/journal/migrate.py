@@ -38,6 +38,15 @@ def revisions_of(branch: str) -> list[str]:
     )
 
 
+def steps_after(branch: str, revision: str) -> list[str]:
+    """Return the subjects of the scripts that bring tables of a branch from this revision to this
+    version, oldest first, as their file names say them."""
+    later = revisions_of(branch)[revisions_of(branch).index(revision) + 1 :]
+    folder = paths.migrations() / branch
+    names = [path.stem for each in later for path in folder.glob(f"{each}_*.py")]
+    return [name.split("_", 2)[2].replace("_", " ") for name in names]
+
+
 def upgrade_to(
     branch: Branch, revision: str = "head", *, before: Before = no_copy
 ) -> Callable[[Connection], str]:

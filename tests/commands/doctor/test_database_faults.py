@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from action_assistant.commands.doctor import database_checks
 from action_assistant.editor.log import database_location
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.migrate import revisions_of
+from support.command_line import ran
 from support.doctor import fault, faults
 
 
@@ -49,8 +51,40 @@ def test_what_the_next_start_changes_is_said_before(data: Path, branch: str) -> 
     altered(data / f"{branch}.db", f"UPDATE alembic_version SET version_num = '{older}'")
     found = fault(data)
     assert (found.code, found.where) == ("schema-older", str(data / f"{branch}.db"))
-    assert f"those of {older}; the next start changes them to {newest}" in found.message
+    assert f"those of {older}; the next start changes them to {newest} (" in found.message
     assert "for which there is room" in found.message
+
+
+def test_before_an_upgrade_one_asks_only_what_it_changes_and_needs(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asked() -> tuple[int, str]:
+        answer = ran("doctor", "--before-upgrade", "--data", data)
+        return answer.returncode, answer.stdout
+
+    def contents() -> dict[Path, bytes]:
+        return {each: each.read_bytes() for each in data.iterdir() if each.is_file()}
+
+    before = contents()
+    code, said = asked()
+    assert code == 0
+    assert "The next start changes no tables, and makes no copy." in said
+    assert "port" not in said, "the rest of this computer is not asked"
+    assert contents() == before
+    for branch in ("editor", "runner"):
+        older = revisions_of(branch)[-3]
+        altered(data / f"{branch}.db", f"UPDATE alembic_version SET version_num = '{older}'")
+    code, said = asked()
+    assert code == 0, "what an upgrade does is a warning"
+    assert "(graph facts, listed graphs), after a copy of" in said
+    assert "(drills, outbox), after a copy of" in said
+    assert "MiB there before it changes tables; with what has to stay free it needs" in said
+    one = max((data / f"{branch}.db").stat().st_size for branch in ("editor", "runner"))
+    monkeypatch.setattr(database_checks, "_bytes_left", lambda _: one + before_upgrade.ROOM)
+    code, said = asked()
+    short = [line for line in said.splitlines() if "[schema-room]" in line]
+    assert (code, len(short)) == (1, 1), "there is room for each, and not for both"
+    assert f"✗ {data / before_upgrade.FOLDER}: " in short[0]
 
 
 def test_an_upgrade_without_room_for_its_copy_is_an_error(

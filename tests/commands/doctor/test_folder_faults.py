@@ -32,6 +32,13 @@ def test_a_folder_that_is_not_there_yet_is_as_it_should_be_and_is_not_made(tmp_p
     assert not (tmp_path / "below").exists()
 
 
+def test_an_empty_folder_that_all_may_read_is_as_it_should_be(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir(mode=0o755)
+    assert faults(tmp_path / "data") == []
+    (tmp_path / "data" / "mine.txt").write_text("of somebody else")
+    assert fault(tmp_path / "data").code == "folder-readable"
+
+
 def test_a_file_in_the_way_of_the_folder_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     found = {each.code: each for each in faults(tmp_path / "file")}

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import anyio
+import msgspec
 import pytest
 
 from action_assistant.runner.links.hardware_stop import StopSignal
@@ -58,17 +59,21 @@ def test_a_container_with_memory_of_its_own_is_told_from_one_that_shares_the_hos
     assert inside("tmpfs") == "[]"
 
 
+NOBODY_THERE = Standing(state="gone", why="Nobody answers.")
+
+
 class Seen:
     """A reach that shows engines, none of which answers as a robot that is registered."""
 
     rmw = "rmw_fastrtps_cpp"
 
-    def __init__(self, *candidates: Candidate) -> None:
+    def __init__(self, *candidates: Candidate, standing: Standing = NOBODY_THERE) -> None:
         self._candidates = candidates
+        self._standing = standing
 
     def link(self, registration: Registration, facts: EngineFacts) -> Any:
-        """A link to a robot of which no engine is seen."""
-        return Gone()
+        """A link to a robot of which no engine is seen, unless something else is said."""
+        return Gone(self._standing)
 
     async def stop_signal(self, *_: object) -> StopSignal:
         """Return a signal that nobody writes."""
@@ -89,7 +94,8 @@ class Seen:
 class Gone:
     """A link to a robot that is not there."""
 
-    standing = Standing(state="gone", why="Nobody answers.")
+    def __init__(self, standing: Standing) -> None:
+        self.standing = standing
 
     async def run(self) -> None:
         """Run without any message."""
@@ -99,10 +105,15 @@ class Gone:
         return nullcontext()
 
 
-def looked(monkeypatch: pytest.MonkeyPatch, robots: int, *seen: Candidate) -> list[Diagnostic]:
-    """Return the findings about `robots` absent robots."""
+def looked(
+    monkeypatch: pytest.MonkeyPatch,
+    robots: int,
+    *seen: Candidate,
+    standing: Standing = NOBODY_THERE,
+) -> list[Diagnostic]:
+    """Return the findings about `robots` robots that are absent, or of another standing."""
     registered = [Registration(name=f"R{n}", domain=10 + n) for n in range(robots)]
-    monkeypatch.setattr(checkup, "ros2_reach", lambda *_: Seen(*seen))
+    monkeypatch.setattr(checkup, "ros2_reach", lambda *_: Seen(*seen, standing=standing))
     monkeypatch.setattr(checkup, "_origin", lambda _: "here")
     monkeypatch.setattr(checkup, "_PATIENCE_S", 0.01)
     return anyio.run(checkup.look, registered, lambda: 0, {})
@@ -143,3 +154,16 @@ def test_a_single_absent_robot_is_named_with_an_engine_without_a_name(
     found = {each.where: each for each in looked(monkeypatch, 1, engine(0))}
     assert found["R0"].code == "robot-elsewhere"
     assert "says no name" not in found["/umrf_graph_get, domain 0"].message
+
+
+def test_two_engines_of_one_robot_are_told_once_and_those_of_nobody_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    why = "2 engines answer on /umrf_graph_get."
+    twins, strangers = (
+        msgspec.structs.replace(engine(domain), servers=2, problem=why) for domain in (10, 11)
+    )
+    standing = Standing(state="silent", why=why, servers=2)
+    found = looked(monkeypatch, 1, twins, strangers, standing=standing)
+    told = [(each.code, each.where) for each in found if each.message == why]
+    assert told == [("robot-silent", "R0"), ("engine-odd", "/umrf_graph_get, domain 11")]

@@ -7,6 +7,8 @@ import shutil
 import socket
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,9 +25,9 @@ from action_assistant.errors import AnothersDatabase, CannotStart, NewerSchema
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.database import Database, cause_of
-from action_assistant.journal.databases import database_of
+from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.journal.events import Event
-from action_assistant.journal.migrate import recognize, revisions_of
+from action_assistant.journal.migrate import recognize, revisions_of, steps_after
 from action_assistant.journal.postgres import weakness
 from action_assistant.schema.editor_tables import editor_event, editor_head, graph
 from action_assistant.system.diagnostics import Diagnostic, fine, found
@@ -298,12 +300,68 @@ def _examine(database: Database, connection: Connection, seen: _DatabaseFindings
     another program or of a newer version."""
     current = max(recognize(connection), default="")
     if current:
-        ours = revisions_of(current.partition("_")[0])[-1]
-        if current != ours:
-            size = sum(database.bytes_in_use(connection).values())
-            seen.older = current, ours, size
+        seen.older = _older(database, connection, current)
         seen.damage = first_damage(database, connection)
         seen.newest = newest_at(connection)
+
+
+def _older(database: Database, connection: Connection, current: str) -> tuple[str, str, int] | None:
+    """Return `current` (the revision of the tables), that of this program, and the bytes of the
+    database; None if both are the same."""
+    ours = revisions_of(current.partition("_")[0])[-1]
+    if current == ours:
+        return None
+    return current, ours, sum(database.bytes_in_use(connection).values())
+
+
+def copies_fit(place: Installation) -> Iterator[Diagnostic]:
+    """Check that there is room for the copies of both databases together, which the next start
+    makes before it changes their tables. Yield the result; a database that cannot be read is
+    skipped, since the checks of the databases report that."""
+    data, sizes = place.data, list[int]()
+
+    def look(database: Database, connection: Connection) -> None:
+        current = max(recognize(connection), default="")
+        if current and (older := _older(database, connection, current)):
+            sizes.append(older[2])
+
+    for url in _databases(place):
+        database = database_of(url)
+        question = partial(look, database)
+        with suppress(CannotStart, TimeoutError):
+            if database.is_local:
+                database.look(question)
+            else:
+                ask_once(url, question)
+    where = data / before_upgrade.FOLDER
+    if not sizes:
+        yield fine(where, "The next start changes no tables, and makes no copy.")
+        return
+    needed, free = sum(sizes) + before_upgrade.ROOM, _bytes_left(data)
+    says = (
+        f"The next start copies {max(1, sum(sizes) >> 20)} MiB there before it changes tables; with "
+        f"what has to stay free it needs {needed >> 20} MiB, and {free >> 20} MiB are left"
+    )
+    if needed > free:
+        yield found("schema-room", where, f"{says}.", "Make room before you start it.")
+    else:
+        yield fine(where, f"{says}.")
+
+
+def _bytes_left(folder: Path) -> int:
+    above = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+    return shutil.disk_usage(above).free
+
+
+def _databases(place: Installation) -> Iterator[str]:
+    """Yield the URLs of the databases of graphs and runs that are there."""
+    with suppress(CannotStart):
+        url = place.database or database_location.of(place.data)
+        database_of(url)
+        if not url.startswith("sqlite:") or Path(make_url(url).database or "").exists():
+            yield url
+    if (place.data / "runner.db").exists():
+        yield f"sqlite:///{place.data / 'runner.db'}"
 
 
 def _refused(where: object, error: CannotStart) -> Diagnostic:
@@ -327,11 +385,12 @@ def _upgrade(where: object, data: Path, seen: _DatabaseFindings) -> Iterator[Dia
     if seen.older is None:
         return
     current, ours, size = seen.older
+    steps = ", ".join(steps_after(current.partition("_")[0], current))
     says = (
-        f"Its tables are those of {current}; the next start changes them to {ours}, after a copy of "
+        f"Its tables are those of {current}; the next start changes them to {ours} ({steps}), after a copy of "
         f"{max(1, size >> 20)} MiB into {data / before_upgrade.FOLDER}"
     )
-    free = shutil.disk_usage(data).free
+    free = _bytes_left(data)
     if size + before_upgrade.ROOM > free:
         needs = (
             f"which needs {(size + before_upgrade.ROOM) >> 20} MiB, and {free >> 20} MiB are left"

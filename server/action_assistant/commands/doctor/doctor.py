@@ -68,6 +68,16 @@ CHECKS: Final[tuple[Check, ...]] = (
     machine_checks.clock_is_possible,
     machine_checks.shared_memory_is_there,
 )
+#: What to know before a newer version is started on a data folder.
+BEFORE_UPGRADE: Final[tuple[Check, ...]] = (
+    machine_checks.program,
+    machine_checks.folder_is_ours,
+    machine_checks.nothing_was_interrupted,
+    machine_checks.backups_are_made,
+    database_checks.graphs_are_there,
+    database_checks.runs_are_there,
+    database_checks.copies_fit,
+)
 _SIGNS: Final[dict[Severity, str]] = {"fine": "✓", "warning": "·", "error": "✗"}
 _ROBOTS_TIMEOUT_S: Final = 45.0
 #: The most seconds that `robots_answer` takes.
@@ -153,7 +163,14 @@ def _add_doctor(doctor: argparse.ArgumentParser) -> None:
     doctor.add_argument(
         "--public-url", metavar="URL", help="where a proxy shows the page; it is asked there"
     )
-    doctor.add_argument(
+    sides = doctor.add_mutually_exclusive_group()
+    sides.add_argument(
+        "--before-upgrade",
+        action="store_true",
+        help="look only at what the next start of this version changes in older data, and whether "
+        "there is room for the copy that it makes before",
+    )
+    sides.add_argument(
         "--only", choices=("machine", "ros"), help="look at one side of it only; default: at both"
     )
     doctor.add_argument(
@@ -181,7 +198,8 @@ def _doctor(options: argparse.Namespace) -> int:
         print(msgspec.json.encode(look_here(place)).decode())
         return 0
     seen: list[Diagnostic] = []
-    for each in _looked_at(place, options.only):
+    before = options.before_upgrade
+    for each in examine(place, BEFORE_UPGRADE) if before else _looked_at(place, options.only):
         seen.append(each)
         if not options.json:
             _tell(each)

@@ -450,8 +450,8 @@ def _readable(data: Path) -> Iterator[Diagnostic]:
             "makes another, and links and sessions of the old one end.",
         )
     rest = [each for each in exposed if each != token]
-    if not rest:
-        return
+    if not rest or not any(data.iterdir()):
+        return  # the first start closes an empty folder, before anything is in it
     remedy = "The next start of this program closes them."
     if data in rest and not holds_nothing_else(data):
         remedy = (

@@ -72,7 +72,7 @@ async def look(
             )
         )
     else:
-        known = {(each.domain, f"/{each.get_service.lstrip('/')}") for each in robots}
+        known = {(each.domain, _path(each)) for each in robots}
         strangers = [each for each in candidates if (each.domain, each.get_service) not in known]
         unseen = [
             each
@@ -80,13 +80,23 @@ async def look(
             if standing.state != "answering" and not standing.servers
         ]
         likely = _likely(unseen, strangers)
-        seen += [_robot(each, standing, likely.get(each.name, ())) for each, standing in standings]
+        told = [_robot(each, standing, likely.get(each.name, ())) for each, standing in standings]
+        seen += told
+        # What is wrong with the engine of a robot is said once, with the robot.
+        ill = {each.where for each in told if each.severity != "fine"}
+        spoken = {(each.domain, _path(each)) for each in robots if each.name in ill}
         seen += _engines(
-            candidates, strangers, [each for each in unseen if each.name not in likely]
+            [each for each in candidates if (each.domain, each.get_service) not in spoken],
+            strangers,
+            [each for each in unseen if each.name not in likely],
         )
     finally:
         await reach.aclose()
     return seen
+
+
+def _path(robot: Registration) -> str:
+    return f"/{robot.get_service.lstrip('/')}"
 
 
 def _no_reach(why: str, robots: Sequence[Registration]) -> Diagnostic:
