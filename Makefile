@@ -23,6 +23,7 @@ ROS := .venv-ros/bin
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
 KEEPING := $(BARE) -u PYTHONDONTWRITEBYTECODE
 NODE := scripts/with-node
+STEP := scripts/step
 # Tests take the one without windows where it is there: it is quicker, and not in every distribution.
 BROWSER = command -v chromium-headless-shell >/dev/null || scripts/need chromium=chromium
 NPM := $(NODE) npm --prefix frontend
@@ -211,8 +212,7 @@ migrate: .venv/.done ## bring the databases to this version (ARGS="--data DIR")
 
 .PHONY: build
 build: setup ## the wheel, with migrations, the built page and its help, in dist/
-	@echo "» wheel"
-	@$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
+	@$(STEP) wheel $(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
 .PHONY: images
@@ -238,9 +238,8 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version)." >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || scripts/need no-such-command=python3-venv
-	@echo "» Python packages into .venv"
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@$(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
+	@$(STEP) "Python packages into .venv" $(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
 	@$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
 	@# Where interpreters may write no bytecode, every process of ours would compile all of it anew.
 	@$(BIN)/python -m compileall -q server tests
@@ -249,25 +248,21 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 # The wheels of rclpy start every interpreter of their environment anew, so they have one of their own.
 .venv-ros/.done: requirements/ros.txt pyproject.toml scripts/build-messages $(wildcard ros/temoto_msgs/* ros/temoto_msgs/*/*)
 	@scripts/need cmake=cmake ninja=ninja-build g++=g++ || exit 1
-	@echo "» rclpy and Python packages into .venv-ros"
 	@test -x $(ROS)/python || $(PYTHON) -m venv .venv-ros
-	@$(ROS)/python -m pip install --quiet --require-hashes --requirement requirements/ros.txt
+	@$(STEP) "rclpy and Python packages into .venv-ros" \
+		$(ROS)/python -m pip install --quiet --require-hashes --requirement requirements/ros.txt
 	@$(ROS)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
-	@echo "» messages of TeMoto into .venv-ros"
-	@scripts/build-messages .venv-ros ros/temoto_msgs
+	@$(STEP) "messages of TeMoto into .venv-ros" scripts/build-messages .venv-ros ros/temoto_msgs
 	@sha256sum requirements/ros.txt | cut -d " " -f 1 >$@
 
 frontend/node_modules/.done: frontend/package-lock.json scripts/with-node
-	@echo "» Node packages into frontend/node_modules"
-	@$(NPM) ci --no-audit --no-fund --loglevel=error
+	@$(STEP) "Node packages into frontend/node_modules" $(NPM) ci --no-audit --no-fund --loglevel=error
 	@touch $@
 
 frontend/dist/index.html: frontend/node_modules/.done $(PAGE_SOURCES)
-	@echo "» building the page"
-	@$(NPM) run --silent build
+	@$(STEP) "the page into frontend/dist" $(NPM) run --silent build
 	@touch $@
 
 build/help/index.html: .venv/.done $(HELP_SOURCES)
-	@echo "» building the help"
-	@$(BIN)/python -B docs/site/build.py build/help
+	@$(STEP) "the help into build/help" $(BIN)/python -B docs/site/build.py build/help
 	@touch $@

@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import subprocess
 from pathlib import Path
 
 import yaml
@@ -36,6 +37,18 @@ def test_the_container_for_development_has_what_ci_installs() -> None:
     assert needed <= set(installed)
     assert settings["postCreateCommand"].split() == ["make", "setup"]
     assert f"USER {settings['remoteUser']}" in (folder / "Dockerfile").read_text()
+
+
+def test_a_step_of_make_is_one_line_unless_it_fails() -> None:
+    def step(command: str) -> subprocess.CompletedProcess[str]:
+        words = [str(ROOT / "scripts" / "step"), "the page", "sh", "-c", command]
+        return subprocess.run(words, capture_output=True, text=True, check=False)
+
+    done = step("seq 250; seq 250 >&2")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "» the page\n", "")
+    failed = step("echo made; echo because >&2; exit 3")
+    assert (failed.returncode, failed.stdout) == (3, "» the page\n")
+    assert failed.stderr == "made\nbecause\n"
 
 
 def test_every_target_that_is_listed_has_a_word_on_what_it_does() -> None:

@@ -256,6 +256,22 @@ def test_the_last_few_copies_stay(tmp_path: Path) -> None:
     assert len(left) == 3 + 5
 
 
+def test_a_copy_has_no_files_beside_it_not_even_of_one_that_was_killed(tmp_path: Path) -> None:
+    place = old(tmp_path)
+    folder = tmp_path / FOLDER
+    folder.mkdir()
+    for suffix in ("", "-wal", "-shm"):
+        (folder / f".editor_0004-20260101-120000.db.part{suffix}").touch()
+    (folder / ".runner_0001-20260101-120000.db.part").touch()
+    place.opened()
+    (copy,) = copies_in(folder)
+    assert inspected(copy.path)[1] == []
+    left = sorted(each.name for each in folder.iterdir())
+    assert left == [".runner_0001-20260101-120000.db.part", copy.path.name], (
+        "the runner's is its own"
+    )
+
+
 def test_an_upgrade_that_fails_at_each_start_takes_no_older_copy_away(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

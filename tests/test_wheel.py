@@ -3,8 +3,10 @@
 It is built, installed and asked for its health by the very steps of the container images.
 """
 
+import contextlib
 import os
 import shutil
+import socket
 import subprocess
 import sys
 import tarfile
@@ -251,6 +253,19 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
         process.terminate()
         process.communicate(timeout=20)
     assert not any(healthy(part, product.port) for part in ("editor", "runner", "serve"))
+
+
+def test_a_slow_process_is_asked_by_one_scheme_only() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as slow:
+        assert not healthy("editor", slow.getsockname()[1])
+        slow.settimeout(0.1)
+        asked = []
+        with contextlib.suppress(TimeoutError):
+            while True:
+                connection, _ = slow.accept()
+                with connection:
+                    asked.append(connection.recv(4))
+    assert asked == [b"GET "], "bytes of TLS would be a warning in its log"
 
 
 def test_the_health_check_knows_tls(tmp_path: Path) -> None:

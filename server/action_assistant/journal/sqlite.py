@@ -412,7 +412,7 @@ def inspected(path: Path) -> tuple[int, list[Damage]]:
     """Return the number of events in the SQLite file `path` and their damages, at any revision of
     its tables. The file is not changed. Raise sqlite3.Error if it cannot be read."""
     inspector, after = Inspector(taken_out), 0
-    with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
+    with closing(sqlite3.connect(f"{path.as_uri()}?{_reads(path)}", uri=True)) as database:
         database.execute("BEGIN")
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
         database.text_factory = _lenient
@@ -427,9 +427,14 @@ def inspected(path: Path) -> tuple[int, list[Damage]]:
 def unchanged(path: Path) -> str:
     """Return the URL for reading the SQLite file `path` without changing it. If its write-ahead log
     is empty, no lock and no index file are made either."""
+    return f"sqlite:///file:{quote(str(path))}?uri=true&{_reads(path)}"
+
+
+def _reads(path: Path) -> str:
+    """Return how an address of SQLite says that `path` is only read. Files beside it are made only
+    where its write-ahead log holds something: a reader may not remove them again."""
     log = path.with_name(f"{path.name}-wal")
-    waits = log.exists() and log.stat().st_size > 0
-    return f"sqlite:///file:{quote(str(path))}?uri=true&" + ("mode=ro" if waits else "immutable=1")
+    return "mode=ro" if log.exists() and log.stat().st_size > 0 else "immutable=1"
 
 
 def _reading(path: Path, driver: Any) -> Engine:

@@ -1,6 +1,7 @@
 """`restore` writes nothing but a whole backup of ours, into a place that is empty or ours."""
 
 import asyncio
+import hashlib
 import json
 import multiprocessing
 import os
@@ -26,6 +27,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Draft, Fold
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.lock import own
 from action_assistant.runner.projection import fold as runner_fold
 from journal.servers import Server
 
@@ -168,6 +170,35 @@ def test_a_file_that_is_not_what_it_says_writes_nothing(
     assert str(harmful) in str(refused.value)
     left = [path for path in tmp_path.rglob("*") if path.suffix != ".lock" and path != new]
     assert sorted(left) == before
+
+
+def test_a_restore_that_is_refused_leaves_nothing_behind(file: Path, tmp_path: Path) -> None:
+    def no_journal(about: dict[str, Any], parts: dict[str, bytes]) -> None:
+        parts["runner.db"] = bytes(4096)
+        about["journals"]["runner"]["sha256"] = hashlib.sha256(bytes(4096)).hexdigest()
+        about["journals"]["runner"]["bytes"] = 4096
+
+    harmful = changed(file, no_journal)
+    new, used = tmp_path / "new", tmp_path / "used"
+    used.mkdir()
+    (used / "token").write_text("kept")
+    with pytest.raises(CannotStart):
+        here("restore", harmful, "--data", new)
+    with pytest.raises(CannotStart):
+        here("restore", harmful, "--data", used)
+    assert not new.exists()
+    assert [each.name for each in used.iterdir()] == ["token"], "and no lock"
+
+
+def test_a_restore_takes_no_lock_away_from_a_server(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "new").mkdir()
+    held = own(tmp_path / "new" / "runner.db")
+    try:
+        with pytest.raises(CannotStart, match="End action-assistant first"):
+            here("restore", file, "--data", tmp_path / "new")
+        assert [each.name for each in (tmp_path / "new").iterdir()] == ["runner.db.lock"]
+    finally:
+        os.close(held)
 
 
 def test_a_link_in_it_is_not_followed(file: Path, tmp_path: Path) -> None:

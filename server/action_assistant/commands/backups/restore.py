@@ -8,7 +8,8 @@ or marked.
 import argparse
 import os
 import shutil
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
@@ -79,10 +80,7 @@ def restore(options: argparse.Namespace) -> int:
             or database_location.remembered(data)
             or f"sqlite:///{data / 'editor.db'}"
         )
-        _make(data)
-        with workshop(data, _WORK) as folder, ExitStack() as locks:
-            for branch in about.journals:
-                locks.callback(os.close, _locked(data, branch))
+        with _made(data), workshop(data, _WORK) as folder, _locked(data, about.journals):
             sweep(data, _WORK)
             package.unpack(folder, progress)
             dropped: list[str] = []
@@ -100,11 +98,22 @@ def restore(options: argparse.Namespace) -> int:
     return 0
 
 
-def _make(data: Path) -> None:
+@contextmanager
+def _made(data: Path) -> Iterator[None]:
+    """Make the data folder if it is missing. A folder that was made for a restore that fails before
+    anything is in it is removed."""
+    is_new = not data.exists()
     try:
         data.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
         raise CannotStart(f"Cannot make {data}: {error.strerror}.") from error
+    try:
+        yield
+    except BaseException:
+        if is_new:
+            with suppress(OSError):  # it is not empty
+                data.rmdir()
+        raise
 
 
 def check_names(about: BackupManifest, source: Path) -> None:
@@ -252,15 +261,35 @@ def _move(source: Path, target: Path) -> None:
     sync(target.parent)
 
 
-def _locked(data: Path, branch: Branch) -> int:
-    """Lock the journal of a branch against all other processes, even if it cannot be opened. Return
-    the descriptor of the lock. Raise CannotStart if another process has locked it."""
+@contextmanager
+def _locked(data: Path, branches: Iterable[Branch]) -> Iterator[None]:
+    """Lock the journals of these branches against all other processes, even if they cannot be
+    opened. Lock files that were made for a restore that fails are removed, while they are held.
+    Raise CannotStart if another process has locked one of them."""
     from action_assistant.journal.sqlite import own
 
-    try:
-        return own(data / f"{branch}.db")
-    except CannotStart as error:
-        raise CannotStart(f"{error} End action-assistant first.") from error
+    made: list[Path] = []
+    with ExitStack() as locks:
+        try:
+            for branch in branches:
+                lock = data / f"{branch}.db.lock"
+                is_new = not lock.exists()
+                locks.callback(os.close, own(data / f"{branch}.db"))
+                if is_new:
+                    made.append(lock)
+        except CannotStart as error:
+            _removed(made)
+            raise CannotStart(f"{error} End action-assistant first.") from error
+        try:
+            yield
+        except BaseException:
+            _removed(made)
+            raise
+
+
+def _removed(files: Iterable[Path]) -> None:
+    for each in files:
+        each.unlink(missing_ok=True)
 
 
 def _replace_database(new: Path, old: Path, aside: Path | None) -> None:

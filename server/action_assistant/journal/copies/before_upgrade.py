@@ -81,6 +81,8 @@ def keep_copy(folder: Path, connection: Connection, branch: Branch, revision: st
         events = _written(target, connection, branch, revision)
         for old in _superfluous([each for each in copies_in(folder) if each.branch == branch]):
             old.path.unlink(missing_ok=True)
+        for left in folder.glob(f".{branch}_*.db.part*"):  # of a copy that was killed
+            left.unlink(missing_ok=True)
     except (OSError, sqlite3.Error) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise CannotStart(_refusal(folder, why or str(error))) from error
