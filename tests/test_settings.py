@@ -32,6 +32,19 @@ def test_the_ports_are_those_that_the_environment_says(
     assert found["base_url"] == "http://127.0.0.1:9000"
 
 
+def test_the_environment_sets_limits_of_persons_and_graphs() -> None:
+    name = "ACTION_ASSISTANT_LIMITS"
+    usual = settings.LoadLimits()
+    assert settings.load_limits({}) == settings.load_limits({name: " OFF "}) == usual
+    assert not settings.limits({name: " OFF "})
+    set_here = settings.load_limits({name: "sockets=20, actions=500"})
+    assert set_here == settings.LoadLimits(sockets=20, actions=500)
+    assert settings.limits({name: "sockets=20"})
+    for wrong in ("of", "sockets", "sockets=9", "actions=5001", "graph-mib=x", "actions=1,", "a=1"):
+        with pytest.raises(CannotStart, match=r"LIMITS is `off`, or a list of sockets=10…10000"):
+            settings.load_limits({name: wrong})
+
+
 @pytest.mark.parametrize(("said", "seconds"), [("", 60.0), ("OFF", None), ("2.5", 2.5)])
 def test_the_environment_sets_how_long_an_editor_may_be_silent(
     said: str, seconds: float | None

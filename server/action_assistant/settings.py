@@ -65,7 +65,9 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_NOTIFICATIONS": "a TOML file that names receivers of messages by webhook and mail",
     "ACTION_ASSISTANT_WATCHDOG": "seconds without an answer after which `serve` starts the editor anew "
     "(60); `off` for never",
-    "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
+    "ACTION_ASSISTANT_LIMITS": "other limits than sockets=100,address-sockets=200,mib-a-minute=16 (of a "
+    "person), actions=5000,graph-mib=32 (of a graph, which may only be less); `off` lifts those of "
+    "persons, for load tests",
     "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
     "direct one fail",
 }
@@ -107,6 +109,28 @@ class Reachability(msgspec.Struct, frozen=True):
     proxies: tuple[Network, ...] = ()
 
 
+class LoadLimits(msgspec.Struct, frozen=True, kw_only=True, rename="kebab"):
+    """The load that one person may be, and how large a graph may become. `sockets`: that a person has
+    open at a time; `address_sockets`: the same of an address; `mib_a_minute`: that a person sends;
+    `actions`, `graph_mib`: of a graph."""
+
+    sockets: int = 100
+    address_sockets: int = 200
+    mib_a_minute: int = 16
+    actions: int = 5_000
+    graph_mib: int = 32
+
+
+#: The least and the most of each limit. Graphs beyond these do not open in time.
+_LOAD_RANGES: Final[Mapping[str, tuple[int, int]]] = {
+    "sockets": (10, 10_000),
+    "address-sockets": (10, 100_000),
+    "mib-a-minute": (1, 1_024),
+    "actions": (10, 5_000),
+    "graph-mib": (1, 32),
+}
+
+
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
     `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS; `frames`: the origins of sites
@@ -120,6 +144,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     runner_port: int = 8001
     hosts: tuple[str, ...] = ()
     limits: bool = True
+    load: LoadLimits = LoadLimits()
     share: bool = False
     tls: bool = False
     switch_database: bool = False
@@ -156,6 +181,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     page_port: int = 8000
     hosts: tuple[str, ...] = ()
     limits: bool = True
+    load: LoadLimits = LoadLimits()
     share: bool = False
     tls: bool = False
     keep: Keep | None = None
@@ -328,7 +354,27 @@ def notifications(environ: Mapping[str, str] = os.environ) -> Path | None:
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Return whether rates and numbers of sockets are limited: they are unless
     ACTION_ASSISTANT_LIMITS is `off`."""
-    return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+    return environ.get("ACTION_ASSISTANT_LIMITS", "").strip().lower() != "off"
+
+
+def load_limits(environ: Mapping[str, str] = os.environ) -> LoadLimits:
+    """Return the limits of persons and graphs, as the environment says them; those that it does not
+    name, or all if they are `off`, are the usual ones. Raise CannotStart for another name or number.
+    """
+    text = environ.get("ACTION_ASSISTANT_LIMITS", "").strip()
+    if text.lower() in {"", "on", "off"}:
+        return LoadLimits()
+    found: dict[str, int] = {}
+    for part in text.split(","):
+        name, _, number = (each.strip() for each in part.partition("="))
+        least, most = _LOAD_RANGES.get(name, (1, 0))
+        if not number.isascii() or not number.isdigit() or not least <= int(number[:9]) <= most:
+            ranges = ", ".join(f"{key}={low}…{high}" for key, (low, high) in _LOAD_RANGES.items())
+            raise CannotStart(
+                f"ACTION_ASSISTANT_LIMITS is `off`, or a list of {ranges}, not {part.strip()!r}."
+            )
+        found[name] = int(number)
+    return msgspec.convert(found, LoadLimits)
 
 
 def watchdog(environ: Mapping[str, str] = os.environ) -> float | None:

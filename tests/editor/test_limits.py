@@ -36,6 +36,32 @@ def add(client: Client, *aids: str) -> None:
             actions_of(client)[f"{aid}|type"] = "sync"
 
 
+async def test_a_setting_makes_graphs_smaller_and_larger_ones_only_stop_growing(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rooms = Rooms(journal, linger=60, window=0)
+    ada, eve = Client("ada"), Client("eve")
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        add(ada, *(f"a{n}" for n in range(12)))
+        await settle(ada)
+    await rooms.close()
+    monkeypatch.setenv("ACTION_ASSISTANT_LIMITS", "actions=10")
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter(STREAM) as room:
+        eve.join(room)
+        await settle(eve)
+        actions_of(eve)["a0"] = "Renamed"
+        await settle(eve)
+        assert await seen(room) == 12, "nothing is lost"
+        add(eve, "one more")
+        await settle(eve)
+        assert await end_of(eve) == messages.FULL
+        assert eve.member is not None
+        assert eve.member.close_text == "a graph may have 10 actions"
+    await rooms.close()
+
+
 async def seen(room: Room) -> int:
     return await room.read(lambda replica, _: document_quota.actions_in(replica.doc))
 

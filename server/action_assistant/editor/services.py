@@ -69,8 +69,10 @@ class EditorServices:
         self.workers = workers
         self.colours = PersonColours()
         self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
-        self.connection_limits = ConnectionLimits(limits=settings.limits)
-        self.rate_limits = ByteRateLimits(limits=settings.limits)
+        self.connection_limits = ConnectionLimits(limits=settings.limits, load=settings.load)
+        self.rate_limits = ByteRateLimits(
+            limits=settings.limits, per_minute=settings.load.mib_a_minute << 20
+        )
         self.graph_reader = GraphReader(journal, self.rooms, workers.graphs)
         self.rights = GraphRights(journal, self.rooms, RulesFile(settings.data, keys), keys)
         self.graph_checks = GraphChecks(

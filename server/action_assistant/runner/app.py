@@ -112,7 +112,9 @@ async def open_services(
         archive_store = ArchiveStore(journal, keep.folder, on_disk)
         storage = StoragePaths(_file(settings), keep.folder)
         async with _executing(services, archive_store, recordings, storage) as control:
-            services.connection_limits = ConnectionLimits(limits=settings.limits, keeps_one=True)
+            services.connection_limits = ConnectionLimits(
+                limits=settings.limits, load=settings.load, keeps_one=True
+            )
             services.journal = journal
             services.review_service = ReviewService(
                 archive_store, utc_us, services.worker_queries, control.next_number

@@ -16,6 +16,7 @@ from action_assistant.editor.crdt.updates.update_scan import outline
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal
+from action_assistant.settings import load_limits
 from action_assistant.web.network.connection_limits import (
     AT_ONCE,
     OF_A_PERSON,
@@ -277,6 +278,20 @@ def test_sockets_are_counted_per_person_and_address() -> None:
     held.pop().__exit__(None, None, None)
     with connection_limits.admitted("cy", "a"):
         pass
+
+
+def test_a_setting_says_how_many_sockets_a_person_and_an_address_may_have() -> None:
+    said = load_limits({"ACTION_ASSISTANT_LIMITS": "sockets=10, address-sockets=12"})
+    connection_limits = ConnectionLimits(limits=True, load=said, clock=lambda: 0.0)
+    with contextlib.ExitStack() as held:
+        for _ in range(10):
+            held.enter_context(connection_limits.admitted("ada", "a"))
+        with pytest.raises(TooMany, match="10 pages"), connection_limits.admitted("ada", "b"):
+            pass
+        for _ in range(2):
+            held.enter_context(connection_limits.admitted("bob", "a"))
+        with pytest.raises(TooMany, match="has 12 conn"), connection_limits.admitted("bob", "a"):
+            pass
 
 
 def test_upgrades_come_in_bursts_and_then_at_a_rate() -> None:

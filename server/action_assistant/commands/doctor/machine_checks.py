@@ -106,11 +106,6 @@ def _anything(_: str) -> None:
     """Accept any value of a setting, since another check reads it."""
 
 
-def _limits(value: str) -> None:
-    if value.lower() not in {"on", "off"}:
-        raise CannotStart(f"ACTION_ASSISTANT_LIMITS is `off` or unset, not {value!r}.")
-
-
 def _hosts(value: str) -> None:
     for each in value.split(","):
         if each.strip() and not _HOST.fullmatch(each.strip()):
@@ -178,7 +173,9 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
         {"ACTION_ASSISTANT_FRAME_ORIGINS": value}
     ),
     "ACTION_ASSISTANT_NOTIFICATIONS": lambda value: receivers_of(Path(value)),
-    "ACTION_ASSISTANT_LIMITS": _limits,
+    "ACTION_ASSISTANT_LIMITS": lambda value: settings.load_limits(
+        {"ACTION_ASSISTANT_LIMITS": value}
+    ),
     "ACTION_ASSISTANT_WATCHDOG": lambda value: settings.watchdog(
         {"ACTION_ASSISTANT_WATCHDOG": value}
     ),

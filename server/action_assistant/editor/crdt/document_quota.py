@@ -14,8 +14,10 @@ from pycrdt import Doc, Map
 from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 from action_assistant.editor.documents.values import ROOTS
 from action_assistant.errors import TooLarge
+from action_assistant.settings import load_limits
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
 
+#: No setting allows more (decision 20); ACTION_ASSISTANT_LIMITS allows less.
 MOST_ACTIONS: Final = 5_000
 MOST_BYTES: Final = 32 << 20
 _WORTH: Final = 1 << 20  # bytes added since, for which measuring again is worth its time
@@ -28,16 +30,24 @@ MOST_ARROWS: Final = 20_000
 MOST_AT_ONE: Final = MOST_ACTIONS
 
 
+def _most_actions() -> int:
+    return min(MOST_ACTIONS, load_limits().actions)
+
+
+def _most_bytes() -> int:
+    return min(MOST_BYTES, load_limits().graph_mib << 20)
+
+
 def refuse_too_much(graph: Graph, dialect: str) -> None:
     """Raise TooLarge, with the place in the file, if a graph has more actions or arrows than a
     document may have. `dialect`: of the file."""
     actions = "/umrf_actions" if dialect in {"D1", "D1'"} else "/actions"
     real = [action for action in graph.actions if not action.missing]
-    if len(graph.actions) > MOST_ACTIONS:
+    if len(graph.actions) > (most := _most_actions()):
         ghosts = len(graph.actions) - len(real)
         told = f", {ghosts:,} of them only named by arrows" if ghosts else ""
         raise TooLarge(
-            f"A graph may have {MOST_ACTIONS:,} actions; this one has {len(graph.actions):,}{told}.",
+            f"A graph may have {most:,} actions; this one has {len(graph.actions):,}{told}.",
             where={"path": actions},
         )
     if len(graph.relations) > MOST_ARROWS:
@@ -72,9 +82,9 @@ def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
 
 
 def refuse_too_long(update: bytes) -> None:
-    """Raise TooLarge if an encoded document (`update`) is too large for a room (MOST_BYTES)."""
-    if len(update) > MOST_BYTES:
-        raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
+    """Raise TooLarge if an encoded document (`update`) is too large for a room."""
+    if len(update) > (most := _most_bytes()):
+        raise TooLarge(f"A graph may have {most >> 20} MiB.", where={"path": ""})
 
 
 class QuotaExceeded(Exception):
@@ -87,6 +97,8 @@ class DocumentQuota:
 
     def __init__(self, doc: "Doc[Any]") -> None:
         self._doc = doc
+        self._most_actions = _most_actions()
+        self._most_bytes = _most_bytes()
         self._bytes = 0
         self._measured = 0
         self._spare = 0
@@ -99,19 +111,19 @@ class DocumentQuota:
         this update. `read`: its outline. An update that only deletes is always accepted."""
         if read.actions > self._spare and self._changed:
             self._changed = False
-            self._spare = MOST_ACTIONS - actions_in(self._doc)
+            self._spare = self._most_actions - actions_in(self._doc)
         if read.actions > max(self._spare, 0):
-            raise QuotaExceeded(f"a graph may have {MOST_ACTIONS:,} actions")
+            raise QuotaExceeded(f"a graph may have {self._most_actions:,} actions")
         if read.fields > self._spare_fields and self._fields_changed:
             self._fields_changed = False
             self._spare_fields = MOST_FIELDS - fields_in(self._doc)
         if read.fields > max(self._spare_fields, 0):
             raise QuotaExceeded(f"a graph may have {MOST_FIELDS:,} fields")
-        if read.brings and self._bytes + len(update) > MOST_BYTES:
+        if read.brings and self._bytes + len(update) > self._most_bytes:
             if self._bytes - self._measured >= _WORTH:
                 self._bytes = self._measured = len(self._doc.get_update())
-            if self._bytes + len(update) > MOST_BYTES:
-                raise QuotaExceeded(f"a graph may have {MOST_BYTES >> 20} MiB")
+            if self._bytes + len(update) > self._most_bytes:
+                raise QuotaExceeded(f"a graph may have {self._most_bytes >> 20} MiB")
 
     def took(self, size: int, actions: int = 0, fields: int = 0) -> None:
         """Count an update that was applied: its `size` in bytes, and the numbers of new actions and

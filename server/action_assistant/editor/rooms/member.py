@@ -10,15 +10,15 @@ from typing import Final
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.presence import NOBODYS, PresenceNews, PresenceOwner
 from action_assistant.kit.token_bucket import Clock, TokenBucket, TokenBuckets
+from action_assistant.settings import LoadLimits
 from action_assistant.web.auth.caller import Origin
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
 
-PER_MINUTE: Final = 16 << 20  # bytes, of all sockets of a person
+PER_MINUTE: Final = LoadLimits().mib_a_minute << 20  # bytes, of all sockets of a person
 AT_ONCE: Final = 32 << 20  # bytes: a large graph after a day without a network
-#: Bytes that a presence message counts for at least, so that 200 of them a second are allowed without end.
-_PRESENCE_BYTES: Final = PER_MINUTE // (60 * 200)
+_MOVES: Final = 200  # presence messages that are allowed in a second without end
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
 _BURST_S: Final = 0.1  # processor time of the loop that edits of one socket may take at once
@@ -29,14 +29,17 @@ _UNHANDLED_EDITS: Final = 256  # of one socket that may wait in the room
 class ByteRateLimits:
     """Limits the bytes that each person sends per time. Without `limits` it never delays anyone."""
 
-    def __init__(self, *, limits: bool, clock: Clock = time.monotonic) -> None:
+    def __init__(
+        self, *, limits: bool, per_minute: int = PER_MINUTE, clock: Clock = time.monotonic
+    ) -> None:
         self._limits = limits
-        self._buckets: Final = TokenBuckets(AT_ONCE, PER_MINUTE / 60, clock)
+        self._buckets: Final = TokenBuckets(AT_ONCE, per_minute / 60, clock)
+        self._presence_bytes: Final = per_minute // (60 * _MOVES)
 
     def spend_on_presence(self, person: str, size: int) -> float:
         """Count a presence message of `size` bytes that a person sent, as some bytes at least;
         return the seconds to wait before more of theirs is read."""
-        return self.spend(person, max(size, _PRESENCE_BYTES))
+        return self.spend(person, max(size, self._presence_bytes))
 
     def spend(self, person: str, size: int) -> float:
         """Count `size` bytes that a person sent; return the seconds to wait before more of theirs is read."""

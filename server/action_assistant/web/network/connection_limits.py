@@ -10,9 +10,10 @@ import anyio
 
 from action_assistant.errors import TooMany
 from action_assistant.kit.token_bucket import Clock, TokenBuckets
+from action_assistant.settings import LoadLimits
 
-OF_A_PERSON: Final = 100  # sockets at a time
-OF_AN_ADDRESS: Final = 200
+OF_A_PERSON: Final = LoadLimits().sockets
+OF_AN_ADDRESS: Final = LoadLimits().address_sockets
 AT_ONCE: Final = 300  # upgrades of one address
 PER_MINUTE: Final = 300  # after that
 
@@ -51,10 +52,12 @@ class ConnectionLimits:
         self,
         *,
         limits: bool,
+        load: LoadLimits = LoadLimits(),  # noqa: B008 - it is frozen
         keeps_one: bool = False,
         clock: Clock = time.monotonic,
     ) -> None:
         self._limits = limits
+        self._load = load
         self._keeps_one = keeps_one
         self._people: Counter[str] = Counter()
         self._addresses: Counter[str] = Counter()
@@ -80,7 +83,7 @@ class ConnectionLimits:
     def _check(self, person: str, address: str) -> None:
         if not self._upgrades.of(address).take():
             raise TooMany("Too many connections in a short time; wait some seconds.")
-        if self._people[person] >= OF_A_PERSON:
-            raise TooMany(f"You have {OF_A_PERSON} pages open already; close some.")
-        if self._addresses[address] >= OF_AN_ADDRESS:
-            raise TooMany(f"Your address has {OF_AN_ADDRESS} connections already.")
+        if self._people[person] >= self._load.sockets:
+            raise TooMany(f"You have {self._load.sockets} pages open already; close some.")
+        if self._addresses[address] >= self._load.address_sockets:
+            raise TooMany(f"Your address has {self._load.address_sockets} connections already.")
