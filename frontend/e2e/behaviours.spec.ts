@@ -55,7 +55,7 @@ test("the script is the default, and behaviours are a choice beside it", async (
   );
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
   await expect(dialog.getByRole("radio", { name: /^Simulator/ })).toHaveAccessibleName(
-    "Simulator its Python code may move something",
+    "Simulator its Python code can move things",
   );
   const hold = dialog.getByRole("button", { name: "Run v1 in the simulator" });
   await expect(hold).toBeEnabled();

@@ -195,7 +195,7 @@ class Scene:
             return faults_of(Told(journal, self.run), self.engines, ended)
 
     def _of_victim(self) -> list[OpenRun]:
-        """Return the pieces of the robot that has failed which may still move."""
+        """Return the pieces of the robot that has failed which may still be moving."""
         return [
             each
             for each in self.control.open.values()

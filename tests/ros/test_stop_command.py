@@ -83,7 +83,10 @@ def test_stop_exits_1_while_an_action_may_be_loading_and_0_once_it_has_run(
             told = product.cli("stop", run)
             assert (told.returncode, told.stdout) == (1, "")
             assert "STOP UNCONFIRMED for run 1 of pair" in told.stderr
-            assert "A is still loading; it may move when it has loaded" in told.stderr
+            assert (
+                "A is still loading; it can begin to move the robot as soon as it has loaded"
+                in told.stderr
+            )
             assert runner.get(f"/api/runs/{run}").json()["proof_at"] is None
             deadline = time.monotonic() + 60
             while (told := product.cli("stop", run)).returncode == 1:

@@ -114,7 +114,7 @@ async def test_an_unconfirmed_stop_is_told_to_all_who_want_it_and_not_each_secon
     assert [id_ for id_, _ in told] == [
         "run/r3:2:chat", "run/r3:2:stops", "run/r3:8:chat", "run/r3:8:stops",
     ]  # fmt: skip
-    start = "A Stop is unconfirmed: run 3 of Fetch on "
+    start = "The Stop of run 3 of Fetch on "
     assert told[0][1].startswith(start)
     assert "David" in told[0][1]
     assert "Bob" in told[0][1]

@@ -42,7 +42,7 @@ test("each fact is a sentence, the same as in a mail", () => {
   expect(textsOf(failed)).toEqual(["Run 12 of Fetch on David has failed: an error. a_0 fell."]);
   const alarms = [{ code: "stop_unconfirmed", at, text: "STOP UNCONFIRMED: no proof." }];
   expect(textsOf(run({ alarms }))).toEqual([
-    "A Stop is unconfirmed: run 12 of Fetch on David may still move. STOP UNCONFIRMED: no proof.",
+    "The Stop of run 12 of Fetch on David is unconfirmed: David may still be moving. STOP UNCONFIRMED: no proof.",
   ]);
   const robots = { "": "David", arm: "Bob" };
   expect(textsOf(run({ robots, held: { by: null, why: "Bob is silent.", since: at } }))).toEqual([

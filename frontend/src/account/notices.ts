@@ -35,7 +35,8 @@ export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): No
   for (const run of runs.values()) {
     if (run.simulated) continue;
     const robots = run.robots ? [...new Set(Object.values(run.robots))] : [run.engine];
-    const words = `un ${run.number} of ${isolated(run.graph_name)} on ${robots.map(isolated).join(", ")}`;
+    const names = robots.map(isolated).join(", ");
+    const words = `un ${run.number} of ${isolated(run.graph_name)} on ${names}`;
     const path = `/runs/${run.id}`;
     const end = FAILED[run.state] ?? (run.result === "on_error" ? "an error" : "");
     if (run.ended_at !== null && end !== "") {
@@ -44,7 +45,7 @@ export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): No
     }
     const alarm = run.alarms.find(({ code }) => code === "stop_unconfirmed");
     if (alarm !== undefined && run.ended_at === null) {
-      const text = `A Stop is unconfirmed: r${words} may still move. ${isolated(alarm.text)}`;
+      const text = `The Stop of r${words} is unconfirmed: ${names} may still be moving. ${isolated(alarm.text)}`;
       found.push({ key: `run.stop_unconfirmed:${run.id}`, text, path });
     }
     if (run.held && run.held.by === null && run.ended_at === null) {

@@ -91,7 +91,7 @@ function failure(error: unknown, run: Run) {
     color: "red",
     autoClose: false as const,
     title: `NOT KNOWN whether run ${run.number} goes on`,
-    message: `${message} Its robots may move.`,
+    message: `${message} Assume that it does: its robots may already be moving.`,
   };
 }
 
@@ -135,7 +135,7 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
             icon={<IconPlayerTrackNext size={13} aria-hidden />}
             label={`Step: ${actionWords(run, action)}`}
             name={`Let only ${place} begin, then wait again`}
-            question={`Let only ${place} begin? ${robot === SIMULATOR ? "Nothing moves." : "It may move at once."}`}
+            question={`Let only ${place} begin? ${robot === SIMULATOR ? "Nothing moves." : "A robot may begin to move at once."}`}
             disabled={disabled}
             onHeld={() => press.mutate({ action })}
           />

@@ -47,7 +47,7 @@ function OutcomeForm({ run, action }: { run: Run; action: string }) {
   const ready = outcome !== "" && reason.trim() !== "";
   const then = run.held
     ? "Nothing begins before somebody lets the run go on."
-    : "What waits for it begins at once, and robots may move.";
+    : "The actions that wait for this outcome begin at once, and their robots may begin to move.";
   return (
     <div className={style.outcome}>
       <Segments

@@ -73,7 +73,9 @@ def _said(question: dict[str, Any]) -> str:
     """Return an open question in one line, with what it is answered by."""
     choices = f" ({', '.join(question['choices'])})" if question.get("choices") else ""
     until = f"  until {question['deadline']}" if question.get("deadline") else ""
-    moves = f"  {', '.join(question['moves'])} may move next" if question.get("moves") else ""
+    moves = (
+        f"  {', '.join(question['moves'])} may begin to move next" if question.get("moves") else ""
+    )
     text = question["text"]
     return f"{question['action']}  {question['kind']}: {text}{choices}{until}{moves}"
 

@@ -527,7 +527,7 @@ async def test_a_run_is_not_at_rest_by_word_while_a_robot_may_move_in_it() -> No
         engines.die()
         await anyio.sleep(10)
         assert control.open[run].run.state == "unknown"
-        with pytest.raises(Conflict, match="David may still move"):
+        with pytest.raises(Conflict, match="David may still be moving"):
             await control.confirm_rest(run, RestRequest("I stand beside it."), BEN)
         assert control.open[run].run.end is None
         await control.stop(run, BEN)

@@ -22,7 +22,7 @@ from runner.robots_in_network import LOOKED, OTHER, PATROL, RobotsInNetwork, ask
 
 SECOND = {"*": [{"after_s": 1.0}]}
 KNOWINGLY = Override(codes=("proof",), reason="it is a test")
-NAME = "Work_0 is still loading; it may move when it has loaded"
+NAME = "Work_0 is still loading; it can begin to move the robot as soon as it has loaded"
 
 
 def scene(loading_s: float, script: dict[str, Any] = SECOND, loss: float = 0.0) -> RobotsInNetwork:

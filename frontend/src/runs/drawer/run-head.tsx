@@ -198,11 +198,14 @@ function failure(error: unknown, paused: boolean) {
   if (!isOutcomeUnknown(error)) {
     return { color: "red", title: paused ? "It does not go on" : "Not paused", message };
   }
+  const assume = paused
+    ? "Assume that it does: the robot may already be moving."
+    : "Assume that it does not: the robot may still be moving.";
   return {
     color: "red",
     autoClose: false as const,
     title: `NOT KNOWN whether the run ${paused ? "goes on" : "pauses"}`,
-    message: `${message} The robot may ${paused ? "move" : "go on"}.`,
+    message: `${message} ${assume}`,
   };
 }
 

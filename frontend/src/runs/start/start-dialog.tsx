@@ -170,7 +170,7 @@ function Choice({ robot, on, may, behaviours, onToggle }: ChoiceProps) {
       <span className="fill ellipsis weight-550">{robot.simulated ? "Simulator" : robot.name}</span>
       {robot.simulated ? (
         <span className="quiet-xs">
-          {behaviours ? "its Python code may move something" : "nothing moves"}
+          {behaviours ? "its Python code can move things" : "nothing moves"}
         </span>
       ) : (
         <EngineLabel robot={robot} />

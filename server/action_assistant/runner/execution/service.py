@@ -440,14 +440,14 @@ class ExecutionService:
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
         """Record that a person has seen a run at rest (nothing moves), where its engine cannot
         prove that; return the run. `asked`: how it was seen. Raise NotFound if there is no such
-        run, Conflict if a piece of it may still move, and what `interventions.confirm_rest` raises.
+        run, Conflict if a piece of it may still be moving, and what `interventions.confirm_rest` raises.
         """
         opened = await self._movable(run)
         for each in self.open.values():
             piece = each.run.piece
             if piece is not None and piece.run == run and each.run.end is None:
                 raise Conflict(
-                    f"{each.run.engine} may still move in it. Look at {each.run.engine}, and confirm "
+                    f"{each.run.engine} may still be moving in this run. Look at {each.run.engine}, and confirm "
                     f"that {piece.node} is at rest.",
                     where={"path": "/how", "run": each.run.id},
                 )

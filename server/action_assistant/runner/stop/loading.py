@@ -212,12 +212,13 @@ def in_words(actions: Sequence[LoadingAction]) -> str:
     who, one = f"{', '.join(names[:_NAMED])}{more}", len(names) == 1
     if all(each.sure for each in actions):
         return (
-            f"{who} {'is' if one else 'are'} still loading; {'it' if one else 'they'} may move when "
-            f"{'it has' if one else 'they have'} loaded"
+            f"{who} {'is' if one else 'are'} still loading; {'it' if one else 'they'} can begin to move "
+            f"the robot as soon as {'it has' if one else 'they have'} loaded"
         )
     return (
         f"{who} may still be loading, since nothing shows whether {'it was' if one else 'they were'} "
-        f"triggered; {'it' if one else 'they'} may move when {'it has' if one else 'they have'} loaded"
+        f"triggered; {'it' if one else 'they'} can begin to move the robot as soon as "
+        f"{'it has' if one else 'they have'} loaded"
     )
 
 

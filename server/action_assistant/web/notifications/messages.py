@@ -39,7 +39,7 @@ _RUN: Final = "run {number} of {graph} on {robot}"
 KINDS: Final[Mapping[str, Kind]] = {
     "run.ended": Kind(f"R{_RUN[1:]} has failed: {{state}}. {{why}}", "/runs/{run}"),
     "run.stop_unconfirmed": Kind(
-        f"A Stop is unconfirmed: {_RUN} may still move. {{why}}", "/runs/{run}"
+        f"The Stop of {_RUN} is unconfirmed: {{robot}} may still be moving. {{why}}", "/runs/{run}"
     ),
     "robot.lost": Kind(
         "{lost} {how}, and run {number} of {graph} is not over. {why}", "/runs/{run}"
