@@ -80,7 +80,7 @@ test("one makes a sub-graph while another edits, both see it, and undo brings al
   const before = await arrows(product, task);
   await pickAll(page, "Grip", "Lift");
   const dialog = await asked(page, "2 actions");
-  await expect(dialog).toContainText("It does what these actions do now");
+  await expect(dialog).toContainText("The new graph does the same as these actions");
   await expect(dialog).toContainText("Takesthing string");
   await expect(dialog).toContainText("Givesnothing");
   await dialog.getByRole("textbox", { name: "Name of the new graph" }).fill("Locate");
@@ -151,7 +151,7 @@ test("what changed meanwhile is told and not overwritten", async () => {
   const { page } = ada;
   await pickAll(page, "Grip", "Lift");
   const dialog = await asked(page, "2 actions");
-  await expect(dialog).toContainText("It does what these actions do now");
+  await expect(dialog).toContainText("The new graph does the same as these actions");
   await annotate(mari.page, "Lift", "slowly");
   const make = dialog.getByRole("button", { name: "Make it", exact: true });
   await make.click();

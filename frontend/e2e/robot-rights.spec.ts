@@ -62,7 +62,7 @@ test("of two people who want a baton one takes it, and the other sees who has it
   await form.getByRole("textbox", { name: "At most" }).fill("60");
   await form.getByRole("button", { name: "Add a limit" }).scrollIntoViewIfNeeded();
   await picture(ada.page, "form");
-  const reports = form.getByRole("switch", { name: "It reports its hardware stop" });
+  const reports = form.getByRole("switch", { name: /reports whether its hardware stop/ });
   await reports.press("Space");
   await form.getByRole("textbox", { name: "Topic" }).fill("/estop");
   await picture(ada.page, "stop");

@@ -47,10 +47,10 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
     assert "every operator may" in said("rights", "David", "--all", "--baton", "off")
     rules = ("--watched", "on", "--drill-days", "30", "--released-only", "on")
     shown = said("rights", "David", *rules)
-    for words in ("says who watches it", "only released versions start", "counts for 30 days"):
+    for words in ("they watch it", "only released versions start", "counts for 30 days"):
         assert words in shown
     shown = said("rights", "David", "--watched", "off", "--drill-days", "0", "--baton", "on")
-    assert ("watches it" in shown, "30 days" in shown, "released" in shown) == (False, False, True)
+    assert ("watch it" in shown, "30 days" in shown, "released" in shown) == (False, False, True)
     assert "released" not in said("rights", "David", "--released-only", "off", "--baton", "off")
     shown = said("rights", "David", "--limit", "torque=..60", "--limit", "Grip.arm::force=-5..5")
     assert "torque at most 60 on David\narm::force of Grip from -5 to 5 on David" in shown

@@ -114,8 +114,9 @@ export function MessagesCard({ runner }: { runner: string | undefined }) {
       ))}
       {isKnown && count === 0 && (
         <p className="m-0 ink2 text-13">
-          Nothing is sent by mail or webhook. <code>ACTION_ASSISTANT_NOTIFICATIONS</code> names a
-          file with receivers; the administrator’s guide in <i>Help</i> says how.
+          No receiver is set up, so no message is sent by mail or webhook.{" "}
+          <code>ACTION_ASSISTANT_NOTIFICATIONS</code> names a file with receivers; the
+          administrator’s guide in <i>Help</i> says how.
         </p>
       )}
       <div className="stack gap-75">

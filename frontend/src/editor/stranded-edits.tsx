@@ -79,7 +79,7 @@ export function OthersDialog({ graph, waiting, opened, onClose }: OthersProps) {
     <Modal
       opened={opened}
       onClose={onClose}
-      title="Changes of others on this device"
+      title="Unsaved changes that other people made on this device"
       closeButtonProps={{ "aria-label": "Close" }}
       centered
     >

@@ -128,7 +128,9 @@ export function GraphList({ folders, folder, none, kept, Try, children }: Props)
           <Empty
             icon={<IconAlertTriangle size={22} />}
             title={
-              graphs === undefined ? "The list cannot be read" : "The list below may be out of date"
+              graphs === undefined
+                ? "The list of graphs could not be loaded"
+                : "The list below may be out of date"
             }
           >
             {errorText(error)}

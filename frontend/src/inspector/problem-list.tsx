@@ -207,7 +207,7 @@ function FixAll({ problems }: { problems: Problems["problems"] }) {
           fullWidth
           mb="sm"
           leftSection={<IconTool size={15} aria-hidden />}
-          title="The examples of old files become the values that a robot acts on. Look at them afterwards; one undo takes it back."
+          title="Older files have only examples of values. This makes the examples the values with which a robot acts. Check them afterwards. One undo reverts it."
           onClick={() => {
             if (applyExamples(doc, problems) === 0) tellNothingLeft();
           }}

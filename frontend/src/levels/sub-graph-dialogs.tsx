@@ -151,7 +151,7 @@ function useMaking(context: EditorContext, look: ExtractionLook, again: () => Pr
     makeActionEdit(context, made.changes);
     notifications.show({
       title: `“${isolated(name)}” is a graph of its own now`,
-      message: "Undo brings the actions back here; that graph then stays in the list of graphs.",
+      message: `If you undo this, the actions return to this graph; “${isolated(name)}” stays in the list of graphs.`,
     });
     return null;
   };
@@ -204,7 +204,9 @@ function ExtractForm({ look, again, ...props }: ExtractProps & PreviewProps) {
       />
       <ParameterLists look={look} />
       {differences.length === 0 ? (
-        <p className="quiet-xs">It does what these actions do now, for all of their results.</p>
+        <p className="quiet-xs">
+          The new graph does the same as these actions, for every outcome that they can have.
+        </p>
       ) : (
         <div className={style.warned}>
           <p>As a sub-graph, the actions may behave differently than they do now:</p>

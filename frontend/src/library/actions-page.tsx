@@ -168,7 +168,7 @@ export function ActionsPage(props: Props) {
       <aside className={style.left} aria-label="Library" hidden={phone && open}>
         {library.isPending && <Skeleton height={200} m="sm" />}
         {library.isError && (
-          <Empty icon={<IconAlertTriangle size={22} />} title="The library cannot be read">
+          <Empty icon={<IconAlertTriangle size={22} />} title="The library could not be loaded">
             {errorText(library.error)}
           </Empty>
         )}

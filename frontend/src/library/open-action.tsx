@@ -187,7 +187,7 @@ function UsesAndRobots({ known, action, knowledge, context }: UsesAndRobotsProps
     try {
       await takeFromGraph(context.id, graph);
       notifications.show({
-        message: `The library has what ${isolated(name)} had. You can go back in the history.`,
+        message: `The library now has the definition of ${isolated(name)}. Its history can restore the earlier one.`,
       });
     } catch (error) {
       notifications.show({ color: "red", title: "Not taken over", message: errorText(error) });

@@ -48,7 +48,7 @@ function useTaking({ id, has, onClose }: Props) {
     try {
       await replaceAction(id, text, difference.after);
       notifications.show({
-        message: `The library has what ${isolated(has.robot)} has. You can go back in the history.`,
+        message: `The library now has the definition of ${isolated(has.robot)}. Its history can restore the earlier one.`,
       });
       onClose();
     } catch (error) {

@@ -228,7 +228,7 @@ function UpdatedGraphs({ done, update }: { done: readonly UpdatedUse[]; update: 
       <p>
         <IconCheck size={15} aria-hidden />{" "}
         {changed.length === 1 ? "1 graph is updated" : `${changed.length} graphs are updated`} and
-        saved. You can go back in the history of each.
+        saved. The history of each can restore the earlier version.
       </p>
       <ul aria-label="Updated graphs">
         {changed.map(({ graph }) => (

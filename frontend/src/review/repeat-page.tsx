@@ -235,7 +235,7 @@ export function RepeatPage({ id, bar }: PageProps & { id: string }) {
       <main className="page">
         {found.isLoading && <Skeleton height={280} />}
         {found.isError && !found.data && (
-          <Empty icon={<IconAlertTriangle size={22} />} title="The repeat cannot be read">
+          <Empty icon={<IconAlertTriangle size={22} />} title="The repeat could not be loaded">
             {errorText(found.error)}
           </Empty>
         )}
@@ -258,7 +258,10 @@ export function RepeatsPage({ bar }: PageProps) {
             <h2 className="page-title">Repeats</h2>
           </div>
           {found.isError && (
-            <Empty icon={<IconAlertTriangle size={22} />} title="The repeats cannot be read">
+            <Empty
+              icon={<IconAlertTriangle size={22} />}
+              title="The list of repeats could not be loaded"
+            >
               {errorText(found.error)}
             </Empty>
           )}

@@ -257,7 +257,7 @@ interface NoRunsProps {
 function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsProps) {
   if (failed !== null) {
     return (
-      <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
+      <Empty icon={<IconAlertTriangle size={22} />} title="The list of runs could not be loaded">
         {errorText(failed)} Recorded runs are safe; they are shown again when the runner answers.
       </Empty>
     );

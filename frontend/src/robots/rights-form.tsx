@@ -175,8 +175,8 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
             onChange={(event) => setBaton(event.currentTarget.checked)}
           />
           <Switch
-            label="Each start says who watches it"
-            description="The person ticks that they watch the robot, with its hardware stop within reach."
+            label="Whoever starts there confirms that they watch the robot"
+            description="Before each start the person ticks a box: they watch the robot, and its hardware stop is within their reach."
             checked={watched}
             onChange={(event) => setWatched(event.currentTarget.checked)}
           />

@@ -49,7 +49,7 @@ function Profile(props: {
         onChange={(event) => put("commit", event.currentTarget.value.trim())}
       />
       <Switch
-        label="A paused graph can be stopped there (Pause is offered only then)"
+        label="Its engine can stop a graph that is paused (otherwise Pause is not offered)"
         checked={is("pauses_safely")}
         onChange={(event) => put("pauses_safely", event.currentTarget.checked)}
       />
@@ -64,7 +64,7 @@ function Profile(props: {
         onChange={(event) => put("bypass_fixed", event.currentTarget.checked)}
       />
       <Switch
-        label="Starts and changes need the yes of a second person"
+        label="Each start, and each change of a run there, needs the yes of a second person"
         checked={is("second_person")}
         onChange={(event) => put("second_person", event.currentTarget.checked)}
       />
@@ -145,7 +145,7 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
         <Stack gap="md">
           <TextInput
             label="Name"
-            description="The wake word of its engine (--actor-name), letter for letter."
+            description="The name with which its engine was started (--actor-name). Small and capital letters count."
             value={robot.name}
             disabled={!editing.isNew}
             error={at("name")}

@@ -38,7 +38,7 @@ export function StopTopicFields({ stop, onChange }: Props) {
   return (
     <Stack gap="xs">
       <Switch
-        label="It reports its hardware stop"
+        label="The robot reports whether its hardware stop is pressed"
         description="Information, no safety function. While it is pressed nothing starts there and what runs is stopped; a release starts nothing. No publisher, another type or an old message count as pressed."
         checked={stop !== null}
         onChange={(event) => onChange(event.currentTarget.checked ? NEW : null)}

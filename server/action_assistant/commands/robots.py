@@ -90,7 +90,9 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         "--baton", choices=["on", "off"], help="only the person who holds its baton may start there"
     )
     rights.add_argument(
-        "--watched", choices=["on", "off"], help="each start says who watches the robot"
+        "--watched",
+        choices=["on", "off"],
+        help="whoever starts there confirms that they watch the robot",
     )
     rights.add_argument(
         "--drill-days",
@@ -306,7 +308,7 @@ def _rules_texts(robot: "Robot") -> list[str]:
     """Return a sentence for each further rule of a robot about starts."""
     said = []
     if robot.watched:
-        said.append(f"each start on {robot.name} says who watches it")
+        said.append(f"whoever starts on {robot.name} confirms that they watch it")
     if robot.released_only:
         said.append(f"only released versions start on {robot.name}")
     said += [f"{each.words()} on {robot.name}" for each in robot.limits]

@@ -124,7 +124,7 @@ export function NumberRows({ action, side, block }: Props) {
                 renamed={given.some((giver) => giver.renamed)}
               />
             )}
-            <Tooltip label="Each number separately: name, type …">
+            <Tooltip label="Show each number by itself, with its name and type">
               <ActionIcon
                 size={24}
                 disabled={false}

@@ -107,7 +107,7 @@ export function useRepeatChoice(
             <Textarea
               key={at}
               label={`Values of ${isolated(inputWords(each.name))} of ${isolated(spokenName(each.action))}`}
-              description="A run for each; one value a line. Empty: as above."
+              description="Write one value on each line: there is a run for each value. If you write none, every run takes the value given above."
               value={texts[at] ?? ""}
               error={why || undefined}
               autosize
