@@ -161,7 +161,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     addresses = _addresses(settings)
     public = settings.reached.public
     page = public.page if public is not None else ""
-    monitoring = Monitoring("editor", settings.data, page=page)
+    monitoring = Monitoring("editor", settings.data, page=page, tls=settings.tls)
     audit = AuditLog()
     monitoring.requests.refused_stranger = audit.refused_stranger
 

@@ -20,6 +20,7 @@ from action_assistant.system.served_addresses import published
 from action_assistant.web.monitoring.faults import (
     FaultWatch,
     Hang,
+    OwnCertificateLook,
     certificate_faults,
     hang_faults,
     note_hang,
@@ -28,6 +29,7 @@ from action_assistant.web.monitoring.faults import (
     storage_faults,
 )
 from action_assistant.web.monitoring.storage import Storage
+from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.notifications.receivers import Mailbox
 
 pytestmark = pytest.mark.anyio
@@ -140,6 +142,21 @@ def test_a_certificate_is_named_two_weeks_before_it_ends() -> None:
         in certificate_faults("lab", now + timedelta(days=3), now)["certificate"]
     )
     assert "ended on" in certificate_faults("lab", now - timedelta(days=3), now)["certificate"]
+
+
+async def test_the_own_certificate_of_a_server_that_runs_for_a_year_is_named(
+    tmp_path: Path,
+) -> None:
+    now = datetime.now(UTC)
+    own = Certificate(tmp_path)
+    own.renew(["lab.local"], now=now - timedelta(days=390))
+    look = OwnCertificateLook(tmp_path).look
+    (text,) = (await look()).values()
+    assert text.startswith("The certificate of this server ends on ")
+    assert text.endswith(": start the program anew, which issues another.")
+    own.renew(["lab.local"])
+    assert await look() != {}, "it still listens with the one of its start"
+    assert await OwnCertificateLook(tmp_path).look() == {}
 
 
 def test_the_other_process_is_a_fault_only_where_it_should_be(tmp_path: Path) -> None:

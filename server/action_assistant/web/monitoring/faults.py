@@ -251,12 +251,39 @@ class CertificateLook:
         return certificate_faults(self._at[0], ends, datetime.now(UTC))
 
 
-def certificate_faults(host: str, ends: datetime, now: datetime) -> Faults:
+class OwnCertificateLook:
+    """Knows when the certificate ends with which this process listens: that of its start, since one
+    that is issued later is not used before the next. `data`: the data folder that has it."""
+
+    def __init__(self, data: Path) -> None:
+        self._data = data
+        self._ends: datetime | None = None
+
+    async def look(self) -> Faults:
+        """Return the fault of a certificate that ends soon or has ended."""
+        if self._ends is None:
+            self._ends = await to_thread.run_sync(_end_of, self._data)
+        remedy = "start the program anew, which issues another"
+        found = certificate_faults("this server", self._ends, datetime.now(UTC), remedy)
+        return {f"own-{what}": text for what, text in found.items()}
+
+
+def _end_of(data: Path) -> datetime:
+    from cryptography import x509  # takes long to load
+
+    from action_assistant.web.network.certificate import Certificate
+
+    return x509.load_pem_x509_certificate(Certificate(data).chain.read_bytes()).not_valid_after_utc
+
+
+def certificate_faults(
+    host: str, ends: datetime, now: datetime, remedy: str = "renew it"
+) -> Faults:
     """Return the fault of a certificate that ends within two weeks."""
     if ends - now > _ENDS_SOON:
         return {}
     how = "ended" if ends <= now else "ends"
-    return {"certificate": f"The certificate of {host} {how} on {ends:%Y-%m-%d}: renew it."}
+    return {"certificate": f"The certificate of {host} {how} on {ends:%Y-%m-%d}: {remedy}."}
 
 
 def note_hang(data: Path, process: str, hang: Hang) -> None:
@@ -293,10 +320,11 @@ def watch_of(
     receivers: Sequence[Receiver],
     *,
     page: str,
+    tls: bool,
     storage: Callable[[], tuple[Storage | None, BackupState | None]],
 ) -> FaultWatch:
     """Return the watch of a process. The editor also looks at backups, at what `serve` has ended,
-    and at the certificate of the public address `page`; "" if there is none."""
+    and at certificates: of the public address `page`, "" if there is none, and with `tls` its own."""
     other: Process = "runner" if process == "editor" else "editor"
 
     async def stored() -> Faults:
@@ -314,4 +342,5 @@ def watch_of(
     looks: list[Look] = [stored, parts, beside]
     if process == "editor":
         looks += [hung, CertificateLook(page).look]
+        looks += [OwnCertificateLook(data).look] if tls else []
     return FaultWatch(journal, receivers, looks)

@@ -115,10 +115,13 @@ disable_created_metrics()  # type: ignore[no-untyped-call]  # each counter and h
 
 class Monitoring:
     """Collects the metrics, readiness and status of one process. `page`: the public URL of the page,
-    "" if there is none."""
+    "" if there is none; `tls`: it listens with a certificate of its own."""
 
-    def __init__(self, process: ProcessName, data: Path, *, page: str = "") -> None:
+    def __init__(
+        self, process: ProcessName, data: Path, *, page: str = "", tls: bool = False
+    ) -> None:
         self._page = page
+        self._tls = tls
         self.requests: Final = RequestCounts()
         self._process = process
         self._data = data
@@ -151,6 +154,7 @@ class Monitoring:
             watched.journal,
             watched.receivers,
             page=self._page,
+            tls=self._tls,
             storage=lambda: (storage.found, storage.backups),
         )
         for each in (watched.journal.metrics, *watched.collectors):
