@@ -67,6 +67,9 @@ test("of two people who want a baton one takes it, and the other sees who has it
   await form.getByRole("textbox", { name: "Topic" }).fill("/estop");
   await picture(ada.page, "stop");
   await reports.press("Space");
+  await form.getByRole("switch", { name: "The operator's page stays visible" }).press("Space");
+  await form.getByRole("textbox", { name: "A led run waits after" }).fill("20");
+  await picture(ada.page, "page");
   await form.getByRole("button", { name: "Save" }).click();
   for (const { page } of [ada, ben])
     await expect(robot(page)).toContainText("Nobody has its baton");
@@ -87,6 +90,9 @@ test("the start says who has the baton, and it is taken over there with a reason
   const looks = page.getByRole("list", { name: "Looked at on David" });
   await expect(looks).toContainText("Ada has its baton", { timeout: 30_000 });
   await expect(looks).toContainText("which the robot does not enforce: torque at most 60");
+  await expect(looks).toContainText("after 60 s the run is stopped. It cannot be made to wait");
+  // This page is visible, and has answered the runner.
+  await expect(looks).not.toContainText("No visible page of Ben answers now");
   await expect(button(page, /A check prevents the start/)).toBeDisabled();
   await picture(page, "start");
   await looks.getByRole("button", { name: "Take it over …" }).click();

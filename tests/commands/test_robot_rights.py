@@ -71,6 +71,12 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
     )
     assert "estop" not in said("rights", "David", "--stop-topic", "")
     assert "Name the topic" in said("rights", "David", "--stop-age", "2", code=1)
+    shown = said("rights", "David", "--page-present", "10..60")
+    assert "waits after 10 s, and each run is stopped after 60 s; no enabling device" in shown
+    assert "visible page" in said("rights", "David", "--watched", "off")  # it stays
+    for wrong, why in (("10", "write it as"), ("60..10", "Stop follows"), ("1..9", "3 s or later")):
+        assert why in said("rights", "David", "--page-present", wrong, code=1)
+    assert "visible page" not in said("rights", "David", "--page-present", "")
     assert main(["robots", "drill", "David"]) == 1  # none was ever made
     assert "There is no such run" in said(
         *("drill", "David", "--run", "x", "--saw-it-stop", "yes", "--hardware-stop", "no"), code=1

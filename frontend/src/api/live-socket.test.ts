@@ -98,6 +98,18 @@ test("a runner that falls silent is unknown, and asked again", async () => {
   live.close();
 });
 
+test("only a visible page answers when the runner asks whether it is there", () => {
+  const live = opened(run("running"));
+  const page = { visibilityState: "hidden" };
+  vi.stubGlobal("document", page);
+  newest().say({ type: "there", number: 7 });
+  expect(newest().sent).toEqual([]);
+  page.visibilityState = "visible";
+  newest().say({ type: "there", number: 8 });
+  expect(newest().sent.map((text) => JSON.parse(text))).toEqual([{ type: "here", number: 8 }]);
+  live.close();
+});
+
 test("Stop goes by socket and by POST at once", async () => {
   const live = opened(run("running"));
   live.stop("r");

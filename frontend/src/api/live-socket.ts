@@ -187,6 +187,17 @@ export class LiveSocket {
     return posted;
   }
 
+  /** Answers for a page that the browser shows; no background tab does. */
+  #sayHere(number: number): void {
+    if (document.visibilityState !== "visible") return;
+    const message: PageMessage = { type: "here", number };
+    try {
+      this.#socket?.send(JSON.stringify(message));
+    } catch (error) {
+      console.warn("The runner does not hear that this page is visible", error);
+    }
+  }
+
   /** Takes in a run that this page has just started, before the socket tells of it. */
   learn(run: Run): void {
     if (!this.state.runs.has(run.id)) this.#putRun(run);
@@ -299,6 +310,9 @@ export class LiveSocket {
         break;
       case "engines":
         this.#set({ engines: message.engines });
+        break;
+      case "there":
+        this.#sayHere(message.number);
         break;
       case "beat": {
         hearStamp(message.at);

@@ -12,6 +12,7 @@ import type { RunnerApi } from "./schema/runner";
 export type RobotRight = RunnerApi["RightShown"];
 export type RightsWanted = Required<RunnerApi["RightsWanted"]>;
 export type ReportedStop = RunnerApi["HardwareStopShown"];
+export type PagePresence = RunnerApi["PagePresence"];
 export type LimitedTo = RunnerApi["Limit"];
 export type AllowedOperator = RunnerApi["OperatorShown"];
 

@@ -23,6 +23,7 @@ import type { Robot } from "../api/robots";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
 import { draftsOf, LimitFields, limitsOf } from "./limit-fields";
+import { PagePresenceFields } from "./page-presence-fields";
 import style from "./rights-form.module.css";
 import { StopTopicFields } from "./stop-topic-fields";
 
@@ -109,6 +110,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
   const [days, setDays] = useState<number | null>(robot.drill_days);
   const [releasedOnly, setReleasedOnly] = useState(robot.released_only);
   const [stop, setStop] = useState(robot.hardware_stop);
+  const [page, setPage] = useState(robot.page_presence);
   const [limits, setLimits] = useState(() => draftsOf(robot.limits));
   usePendingText(
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
@@ -130,6 +132,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
         ask_again: Number(askAgain) || 0,
         limits: limitsOf(limits),
         hardware_stop: stop,
+        page_presence: page,
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
@@ -212,6 +215,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
             value={askAgain}
             onChange={setAskAgain}
           />
+          <PagePresenceFields page={page} onChange={setPage} />
           <StopTopicFields stop={stop} onChange={setStop} />
           <LimitFields drafts={limits} onChange={setLimits} />
           {error !== null && (

@@ -71,6 +71,11 @@ function robotSigns(robot: Robot): Sign[] {
     const text = robot.pressed || "Its hardware stop is not pressed, as it reports";
     signs.push({ good: robot.pressed === "", text });
   }
+  if (robot.page_presence !== null) {
+    const { wait_s, stop_s } = robot.page_presence;
+    const text = `Asks for a visible page of whoever runs something: without one a led run waits after ${wait_s} s, and each run is stopped after ${stop_s} s`;
+    signs.push({ good: true, text });
+  }
   if (robot.others > 0) {
     const who = robot.others === 1 ? "1 other program" : `${robot.others} other programs`;
     signs.push({ good: false, text: `${isolated(who)} can also start graphs on it` });

@@ -147,6 +147,12 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     rights.add_argument(
         "--stop-level", type=int, metavar="N", help="the level from which it does; default: 2"
     )
+    rights.add_argument(
+        "--page-present",
+        metavar="WAIT..STOP",
+        help="whoever starts there, or holds its baton, keeps a page visible: without one for so many "
+        "seconds a led run waits, and each run is stopped, as 10..60; no enabling device; '' for off",
+    )
     rights.set_defaults(handler=_rights)
 
 
@@ -268,6 +274,7 @@ def _rights(options: argparse.Namespace) -> int:
             options.limit,
             options.no_limits or None,
             *stop,
+            options.page_present,
         )
         if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
@@ -289,6 +296,8 @@ def _rights(options: argparse.Namespace) -> int:
                 wanted["limits"] = [_limit(each) for each in options.limit or ()]
             if any(each is not None for each in stop):
                 wanted["hardware_stop"] = _hardware_stop(options, robot)
+            if options.page_present is not None:
+                wanted["page_presence"] = _page_presence(options.page_present)
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
     print(one_line(f"{robot.name}: {_operators_text(robot)}"))
@@ -316,6 +325,12 @@ def _rules_texts(robot: "Robot") -> list[str]:
         rule = HardwareStop(**msgspec.structs.asdict(robot.hardware_stop))
         said.append(f"the hardware stop of {robot.name} is pressed: {rule.words()}")
         said.append(robot.pressed or "it is not pressed")
+    if robot.page_presence is not None:
+        page = robot.page_presence
+        said.append(
+            f"without a visible page of its person a led run on {robot.name} waits after "
+            f"{page.wait_s:g} s, and each run is stopped after {page.stop_s:g} s; no enabling device"
+        )
     if robot.drill_days is not None:
         said.append(f"a Stop drill of {robot.name} counts for {robot.drill_days} days")
     return said
@@ -405,6 +420,21 @@ def _hardware_stop(options: argparse.Namespace, robot: "Robot") -> dict[str, Any
     if topic is None:
         raise RequestRefused(f"Name the topic of the hardware stop of {robot.name}: --stop-topic.")
     return {**before, **named, "topic": topic}
+
+
+def _page_presence(asked: str) -> dict[str, float] | None:
+    """Return for how long pages may be missing, from WAIT..STOP; None for "". Raise RequestRefused if it
+    is neither."""
+    if not asked:
+        return None
+    wait, _, stop = asked.partition("..")
+    try:
+        found = {"wait_s": float(wait), "stop_s": float(stop)}
+        if not all(map(isfinite, found.values())):
+            raise ValueError
+    except ValueError as wrong:
+        raise RequestRefused(f"{asked!r} is no such time; write it as 10..60.") from wrong
+    return found
 
 
 def _names(server: Server) -> dict[str, str]:

@@ -1092,6 +1092,15 @@ export interface RunnerApi {
         runs: RunnerApi["RunShown"][];
     };
     /**
+     * HereMessage
+     * @description The answer of a page that is visible to `there`, with its number. It gets none itself.
+     */
+    HereMessage: {
+        /** @enum {string} */
+        type: "here";
+        number: number;
+    };
+    /**
      * HistoryEvent
      * @description One stored event, for programs that follow a run.
      */
@@ -1525,7 +1534,27 @@ export interface RunnerApi {
     OwnConfirmation: {
         last: RunnerApi["Confirmation"] | null;
     };
-    PageMessage: RunnerApi["StopMessage"];
+    PageMessage: RunnerApi["StopMessage"] | RunnerApi["HereMessage"];
+    /**
+     * PagePresence
+     * @description The rule that the page of whoever is responsible for a run stays visible. Seconds without an
+     *     answer of one: after `wait_s` a led run begins nothing further, after `stop_s` each run is
+     *     stopped.
+     */
+    PagePresence: {
+        wait_s: number;
+        stop_s: number;
+    };
+    /**
+     * PagePresenceWanted
+     * @description The rule that the page of whoever is responsible for a run stays visible. Seconds without an
+     *     answer of one: after `wait_s` a led run begins nothing further, after `stop_s` each run is
+     *     stopped.
+     */
+    PagePresenceWanted: {
+        wait_s: number;
+        stop_s: number;
+    };
     /**
      * PartOfRepeat
      * @description The place of a run in a repeat: its id, and the number of the cell, from 1.
@@ -2103,8 +2132,9 @@ export interface RunnerApi {
      *     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
      *     `released_only`: only versions start there that an owner has released;
      *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
-     *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not; where
-     *     one of these is missing, it stays as it is.
+     *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not;
+     *     `page_presence`: null where no page has to stay visible; where one of these is missing, it stays as it
+     *     is.
      */
     RightsWanted: {
         /** @default all */
@@ -2121,6 +2151,7 @@ export interface RunnerApi {
         ask_again?: number;
         limits?: RunnerApi["LimitWanted"][];
         hardware_stop?: RunnerApi["HardwareStopWanted"] | null;
+        page_presence?: RunnerApi["PagePresenceWanted"] | null;
     };
     /**
      * Robot
@@ -2135,7 +2166,8 @@ export interface RunnerApi {
      *     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
      *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
      *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
-     *     is not; `pressed`: why it counts as pressed, "" if it does not.
+     *     is not; `pressed`: why it counts as pressed, "" if it does not; `page_presence`: for how long the page
+     *     of whoever is responsible for a run may be missing there, null where none is asked for.
      */
     Robot: {
         name: string;
@@ -2175,6 +2207,7 @@ export interface RunnerApi {
         limits: RunnerApi["Limit"][];
         hardware_stop: RunnerApi["HardwareStopShown"] | null;
         pressed: string;
+        page_presence: RunnerApi["PagePresence"] | null;
     };
     /**
      * RobotChange
@@ -2570,7 +2603,7 @@ export interface RunnerApi {
             [key: string]: RunnerApi["Limit"][];
         };
     };
-    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
+    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["ThereMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * SaidShown
      * @description A person's statement of the result of a visit that no answer has shown.
@@ -2931,7 +2964,7 @@ export interface RunnerApi {
     };
     /**
      * StopMessage
-     * @description A press of Stop, the only message that a page may send. `run`: the id of a run or a group, or
+     * @description A press of Stop. `run`: the id of a run or a group, or
      *     "all"; `stop_id`: the id of the press.
      */
     StopMessage: {
@@ -3012,6 +3045,15 @@ export interface RunnerApi {
         text: string;
         /** Format: date-time */
         at: string;
+    };
+    /**
+     * ThereMessage
+     * @description Asks a page of an operator to answer if it is visible, while a robot asks for such pages.
+     */
+    ThereMessage: {
+        /** @enum {string} */
+        type: "there";
+        number: number;
     };
     /**
      * TokenList

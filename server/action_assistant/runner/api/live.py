@@ -54,16 +54,25 @@ _AT_ONCE: Final = 250  # actions whose views are made in one turn of the event l
 _ENGINES_GAP_S: Final = 0.25  # between two lists of engines
 _ENGINES_S: Final = 1.0  # for which an encoded list of engines is used
 _MOST_ANSWERS: Final = 64
+_MOST_ASKED: Final = (
+    10  # newest questions whether a page is visible; answers to older ones are late
+)
 _TOO_SLOW: Final = 1013
 _LONGEST: Final = 10_000  # characters of a message from the page
 
 
 class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
-    """A press of Stop, the only message that a page may send. `run`: the id of a run or a group, or
+    """A press of Stop. `run`: the id of a run or a group, or
     "all"; `stop_id`: the id of the press."""
 
     run: str
     stop_id: str = ""
+
+
+class HereMessage(msgspec.Struct, frozen=True, tag="here", tag_field="type"):
+    """The answer of a page that is visible to `there`, with its number. It gets none itself."""
+
+    number: int
 
 
 class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
@@ -120,6 +129,12 @@ class ConfirmMessage(msgspec.Struct, frozen=True, tag="confirm", tag_field="type
     asked: list[ConfirmationShown]
 
 
+class ThereMessage(msgspec.Struct, frozen=True, tag="there", tag_field="type"):
+    """Asks a page of an operator to answer if it is visible, while a robot asks for such pages."""
+
+    number: int
+
+
 class Heartbeat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
     """Sent once a second while the link is alive. `seen`: when each open run was last shown by its
     engine; `heard`: when each robot last answered."""
@@ -131,9 +146,16 @@ class Heartbeat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
 
 #: The messages of the runner over the socket, and those of a page.
 RunnerMessage: TypeAlias = (
-    Hello | RunMessage | EnginesMessage | ConfirmMessage | Heartbeat | Stopping | RefusedMessage
+    Hello
+    | RunMessage
+    | EnginesMessage
+    | ConfirmMessage
+    | ThereMessage
+    | Heartbeat
+    | Stopping
+    | RefusedMessage
 )
-PageMessage: TypeAlias = StopMessage
+PageMessage: TypeAlias = StopMessage | HereMessage
 
 
 class _EncodedHello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
@@ -172,6 +194,10 @@ class _Engines(msgspec.Struct, frozen=True):
 #: The part of what somebody may not see that changes what they see of robots: whether there is anything, and
 #: the runs on robots that are hidden. None if they see everything.
 _Audience: TypeAlias = tuple[bool, frozenset[str]] | None
+
+
+def _nobody_asked(_number: int) -> None:
+    """Do nothing: where no page is asked whether it is visible."""
 
 
 class Hub:
@@ -326,17 +352,23 @@ class Hub:
         *,
         denied: str = "",
         unseen: Callable[[], Unseen | None] = sees_all,
+        here: Callable[[int], None] = _nobody_asked,
     ) -> str:
-        """Carry out a message of a page in the name of `author`, and return the text of the answer.
+        """Carry out a message of a page in the name of `author`, and return the text of the answer, ""
+        for none.
         A message that cannot be understood or carried out is answered with the reason, not raised.
         `denied`: why its sender may not stop anything; "" if they may. `unseen`: returns the graphs
-        that they may not see; it is asked for the answer only, once the Stop has begun.
+        that they may not see; it is asked for the answer only, once the Stop has begun. `here`: called
+        with the number to which a visible page has answered.
         """
         stop_id = ""
         try:
             if len(text) > _LONGEST:
                 raise msgspec.ValidationError("too long")
-            message = msgspec.json.decode(text, type=StopMessage)
+            message: PageMessage = msgspec.json.decode(text, type=PageMessage)
+            if isinstance(message, HereMessage):
+                here(message.number)
+                return ""
             stop_id = message.stop_id
             if denied:
                 raise Forbidden(denied)
@@ -377,6 +409,8 @@ class Outbox:
         self._engines_at = math.inf  # when the engines are to be sent
         self._engines_next = 0.0  # not before
         self._has_requests = False
+        self._asked: deque[float] = deque(maxlen=_MOST_ASKED)  # when `there` was sent
+        self._asks = 0  # how often it was
         self._news = anyio.Event()
 
     def mark(self, opened: OpenRun) -> None:
@@ -395,6 +429,29 @@ class Outbox:
         """Have the requests to confirm sent to the page, since one of its person has changed."""
         self._has_requests = True
         self._news.set()
+
+    def here(self, number: int) -> None:
+        """Take the answer of a visible page to the `there` with this number: its person was there when
+        that was sent. An answer to an older one, or by who may not operate, shows nothing."""
+        place = number - self._asks + len(self._asked)
+        if 0 <= place < len(self._asked) and self._counts():
+            self._hub.control.rights.see(self.identity, self._asked[place])
+
+    def _counts(self) -> bool:
+        """Return whether this page can be that of an operator: no program, and no viewer."""
+        now = self._hub.identity_now(self.identity)
+        if now is None or now.session is None or not self._is_allowed():
+            return False
+        return not isinstance(may(now, "operate", now=time.time()), Denied)
+
+    def _there(self, now: float) -> str | None:
+        """Return the text that asks whether this page is visible; None if it is not to be asked now."""
+        is_early = bool(self._asked) and now - self._asked[-1] < _HEARTBEAT_S
+        if is_early or not self._hub.control.rights.asks_for_pages or not self._counts():
+            return None
+        self._asked.append(now)
+        self._asks += 1
+        return _text(ThereMessage(self._asks - 1))
 
     def post(self, text: str) -> bool:
         """Queue the text of an answer without waiting; return False when too many answers wait,
@@ -462,6 +519,8 @@ class Outbox:
             return None
         if now >= self._look_at:
             self._look_again()
+        if (there := self._there(now)) is not None:
+            return there
         if self._has_requests:
             self._has_requests = False
             return _text(ConfirmMessage(self._hub.requests.shown_to(self.identity)))
@@ -514,7 +573,8 @@ async def _read(
             text = await socket.receive_text()
             stop = may(identity, "stop", now=time.time())
             denied = stop.reason if isinstance(stop, Denied) else ""
-            if not box.post(await hub.follow(text, author, denied=denied, unseen=unseen)):
+            answer = await hub.follow(text, author, denied=denied, unseen=unseen, here=box.here)
+            if answer and not box.post(answer):
                 await socket.close(code=_TOO_SLOW, reason="too slow")
                 break
     except (WebSocketDisconnect, WebSocketException, OSError):
@@ -534,5 +594,5 @@ async def _write(socket: WebSocket[Any, Any, Any], hub: Hub, box: Outbox) -> Non
         pass
 
 
-def _text(message: Stopping | RefusedMessage | Heartbeat | ConfirmMessage) -> str:
+def _text(message: Stopping | RefusedMessage | Heartbeat | ConfirmMessage | ThereMessage) -> str:
     return msgspec.json.encode(message).decode()

@@ -15,7 +15,7 @@ from action_assistant.runner.api.run_guard import require_run, unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.links.hardware_stop import HardwareStop, SignalKind
 from action_assistant.runner.robots.registration import DrillShown, Robot, drill_view
-from action_assistant.runner.robots.rights import Operator, Rules
+from action_assistant.runner.robots.rights import Operator, PagePresence, Rules
 from action_assistant.runner.runs import views
 from action_assistant.runner.start.drills import DrillRequest
 from action_assistant.safe_text import hold_names
@@ -68,14 +68,24 @@ class HardwareStopWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     level: Annotated[int, msgspec.Meta(ge=1, le=3)] = 2
 
 
+class PagePresenceWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The rule that the page of whoever is responsible for a run stays visible. Seconds without an
+    answer of one: after `wait_s` a led run begins nothing further, after `stop_s` each run is
+    stopped."""
+
+    wait_s: float
+    stop_s: float
+
+
 class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
     `released_only`: only versions start there that an owner has released;
     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
-    `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not; where
-    one of these is missing, it stays as it is."""
+    `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not;
+    `page_presence`: null where no page has to stay visible; where one of these is missing, it stays as it
+    is."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
@@ -89,6 +99,7 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
         Annotated[tuple[LimitWanted, ...], msgspec.Meta(max_length=MOST_LIMITS)] | msgspec.UnsetType
     ) = msgspec.UNSET
     hardware_stop: HardwareStopWanted | msgspec.UnsetType | None = msgspec.UNSET
+    page_presence: PagePresenceWanted | msgspec.UnsetType | None = msgspec.UNSET
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -347,6 +358,13 @@ def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
         stop = HardwareStop(**msgspec.structs.asdict(wanted.hardware_stop))
         if stop.fault:
             raise BadInput(stop.fault, where={"path": "/hardware_stop"})
+    page = before.page_presence
+    if wanted.page_presence is None:
+        page = None
+    elif wanted.page_presence is not msgspec.UNSET:
+        page = PagePresence(**msgspec.structs.asdict(wanted.page_presence))
+        if page.fault:
+            raise BadInput(page.fault, where={"path": "/page_presence"})
     operators: tuple[Operator, ...] | None = None
     if wanted.operators != "all":
         ids = [each.id for each in wanted.operators]
@@ -362,6 +380,7 @@ def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
         ask_again=wanted.ask_again,
         limits=limits,
         hardware_stop=stop,
+        page_presence=page,
     )
 
 

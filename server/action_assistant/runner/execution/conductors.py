@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
+from functools import partial
 from typing import Final
 from weakref import WeakValueDictionary
 
@@ -72,6 +73,9 @@ class Conductors:
         self._runtime = runtime
         self._claims = IdempotentStarts(runtime.journal, runtime.tasks, runtime.clock_us)
         self._open: WeakValueDictionary[str, Conductor] = WeakValueDictionary()
+        #: Returns why a person whose page is missing may not let a run go on, by run and robot; "" if they
+        #: may.
+        self.why_missing: Callable[[str, str, Identity], str] | None = None
         runs.watch(self._see)
 
     def open(
@@ -111,6 +115,8 @@ class Conductors:
             pressed=conductor.close,
             may_leave=may_leave,
         )
+        if self.why_missing is not None:
+            conductor.gate.why_missing = partial(self.why_missing, run.id)
         conductor.leads(_leading(opened))
         self._open[run.id] = conductor
         return opened
@@ -221,6 +227,12 @@ class Conductors:
         for conductor in tuple(self._open.values()):
             if robot in conductor.gate.robots:
                 conductor.gate.rights_changed(robot)
+
+    def hold(self, run: str, why: str) -> None:
+        """Hold a led run for a reason of the runner; do nothing if nothing can lead it."""
+        conductor = self._open.get(run)
+        if conductor is not None:
+            conductor.gate.hold_run(why)
 
     def question(self, run: str, question: str) -> OpenQuestion | None:
         """Return an open question of a run; None if it is not open."""

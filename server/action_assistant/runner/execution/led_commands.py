@@ -279,6 +279,7 @@ def claim_of(run: Run, watching: tuple[str, ...]) -> Claim:
         is_drill=run.drill,
         beyond=run.beyond,
         limits=run.limits if run.led is None else None,
+        is_led=run.led is not None,
     )
 
 

@@ -66,6 +66,7 @@ class LedGate(Gate):
             digest=first.tree_digest or first.digest,
             watching=frozenset(first.watching),
             beyond=first.beyond,
+            is_led=True,
         )
         #: The robots that play actions of the run.
         self.robots: Final = frozenset(first.led.players.values())
@@ -88,6 +89,8 @@ class LedGate(Gate):
         self._due: list[str] = []  # breakpoints that were reached during trouble
         #: Called in the step in which the run is held.
         self.on_hold: Callable[[], None] = _ignore
+        #: Returns why a person whose page is missing may not let the run go on, by robot; "" if they may.
+        self.why_missing: Callable[[str, Identity], str] = _not_missing
         #: Stops the run in the name of the runner.
         self.stop_run: Callable[[], None] = _ignore
 
@@ -270,7 +273,8 @@ class LedGate(Gate):
         if step is not self._next(press.limit):
             raise Conflict("Another action waits to begin than before. Look at it first.")
         for name in sorted(self.robots):  # in the step in which the gate opens
-            if why := self._look.why_not_allowed(name, lead, claim):
+            why = self._look.why_not_allowed(name, lead, claim) or self.why_missing(name, lead)
+            if why:
                 raise Conflict(f"Nothing has gone on. {why}", where={"path": "/robots"})
         self.person, self.claim = lead, claim
         self._let, self._let_by, self._until = step, press.author, press.limit.until
@@ -292,3 +296,8 @@ class LedGate(Gate):
 
 def _ignore() -> None:
     """Do nothing: before the run is led."""
+
+
+def _not_missing(_robot: str, _lead: Identity) -> str:
+    """Return "": where no page is asked for."""
+    return ""

@@ -29,6 +29,7 @@ from action_assistant.runner.execution.led_commands import (
 )
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.operator_pages import OperatorPages
 from action_assistant.runner.execution.question_commands import QuestionCommands
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.start_checks import NO_SOURCES, StartChecks, StartSources
@@ -146,6 +147,10 @@ class ExecutionService:
             earlier=self._earlier,
         )
         self._conductors = Conductors(robots, look, self._runs, self.history, simulator, runtime)
+        self.operator_pages: Final = OperatorPages(
+            self.rights, self._runs, self._conductors.hold, self._page_missing
+        )
+        self._conductors.why_missing = self.operator_pages.why_missing
         self._led = LedCommands(
             self._conductors,
             self.rights,
@@ -259,8 +264,18 @@ class ExecutionService:
                 if not opened.is_led:
                     opened.alarm("hardware_stop", why)
 
+    def _page_missing(self, opened: OpenRun, robot: str, why: str) -> None:
+        """Begin to stop a run of whose people no page has been visible for too long."""
+        author = msgspec.structs.replace(RUNNER, name=f"the watch for pages of {robot}")
+        self._tell_of_stop(author, "", opened.run.id)
+        try:
+            self._stop(opened.run.id, author, "")
+        finally:
+            opened.alarm("page_missing", why)
+
     def _rights_changed(self, robot: str) -> None:
         self.hardware_stops.look()
+        self.operator_pages.look()
         self._conductors.rights_changed(robot)
         self._robots_changed()
 
@@ -625,6 +640,7 @@ class ExecutionService:
         await self.foreign_stops.take_up()
         # Until here each robot with a hardware stop counts as pressed; what a press stops is known now.
         self._runtime.tasks.start_soon(self.hardware_stops.run)
+        self._runtime.tasks.start_soon(self.operator_pages.run)
 
     async def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is

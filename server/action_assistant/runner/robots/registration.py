@@ -19,7 +19,7 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.rights import Drilled, RobotRights
+from action_assistant.runner.robots.rights import Drilled, PagePresence, RobotRights
 from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, Unseen
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import hold_names
@@ -145,7 +145,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
-    is not; `pressed`: why it counts as pressed, "" if it does not.
+    is not; `pressed`: why it counts as pressed, "" if it does not; `page_presence`: for how long the page
+    of whoever is responsible for a run may be missing there, null where none is asked for.
     """
 
     name: str
@@ -182,6 +183,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     limits: tuple[Limit, ...] = ()
     hardware_stop: HardwareStopShown | None = None
     pressed: str = ""
+    page_presence: PagePresence | None = None
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -325,4 +327,5 @@ def with_rights(
         hardware_stop=rules.hardware_stop
         and HardwareStopShown(**msgspec.structs.asdict(rules.hardware_stop)),
         pressed=pressed,
+        page_presence=rules.page_presence,
     )

@@ -35,6 +35,7 @@ def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
         beyond=ready is not None and ready.beyond,
         limits=None if ready is None else ready.limits,
         over=() if ready is None else ready.over,
+        is_led=request.engine == CONDUCTED,
     )
 
 

@@ -27,6 +27,7 @@ from action_assistant.runner.robots.rights import (
     Drilled,
     Holder,
     Lock,
+    PagePresence,
     Refusal,
     RightsEvent,
     RobotRights,
@@ -100,6 +101,7 @@ class RightsRegistry:
         self._records: dict[str, _Record] = {}
         self._live: dict[str, list[Identity]] = {}  # by person, one for each open page
         self._gone_at: dict[str, float] = {}  # by person, in seconds of the event loop
+        self._seen_at: dict[str, float] = {}  # by person: when a visible page was last known
         self._began = 0.0
         self._news = anyio.Event()
         #: Returns why the hardware stop of a robot counts as pressed, as a sentence; "" if it does not.
@@ -171,6 +173,22 @@ class RightsRegistry:
     def hardware_stop_of(self, robot: str) -> HardwareStop | None:
         """Return where the hardware stop of a robot is reported; None where it is not."""
         return self._record(robot).decided.rules.hardware_stop
+
+    def page_presence_of(self, robot: str) -> PagePresence | None:
+        """Return for how long a page may be missing during runs on a robot; None where none is asked
+        for. A rule that is just being changed counts as long as that is not stored."""
+        record = self._record(robot)
+        decided, stored = record.decided.rules.page_presence, record.stored.rules.page_presence
+        if decided is None or stored is None or decided == stored:
+            return decided or stored
+        return PagePresence(
+            wait_s=min(decided.wait_s, stored.wait_s), stop_s=min(decided.stop_s, stored.stop_s)
+        )
+
+    @property
+    def asks_for_pages(self) -> bool:
+        """Return whether a robot asks for visible pages."""
+        return any(self.page_presence_of(name) is not None for name in self._robots.names)
 
     def limits_of(self, robot: str) -> tuple[Limit, ...]:
         """Return the limits in force on a robot: also those that are just being taken away."""
@@ -275,6 +293,9 @@ class RightsRegistry:
                 f"The hardware stop of {robot} is not pressed: {rule.words()}. This is information."
             )
             found.append(Item(code="pressed", verdict="passed", text=text))
+        page = self.page_presence_of(robot)
+        if page is not None:
+            found.append(self._page_item(robot, page, identity, claim))
         limits = self.limits_of(robot)
         if limits and claim.limits is not None and "limit" not in blocked:
             said = ", ".join(each.words() for each in limits[:_NAMED])
@@ -284,6 +305,16 @@ class RightsRegistry:
         if "drill" not in blocked:
             found += self._drill_items(robot, claim)
         return tuple(found)
+
+    def _page_item(self, robot: str, rule: PagePresence, identity: Identity, claim: Claim) -> Item:
+        """Return the item that says what happens without a visible page. It blocks nothing."""
+        text = rule.words(robot, is_led=claim.is_led)
+        seen_at = self.seen_at(identity.person.id)
+        if seen_at is not None and anyio.current_time() - seen_at < rule.wait_s:
+            return Item(code="present", verdict="passed", text=text)
+        who = identity.person.name or "the starter"
+        text = f"{text} No visible page of {who} answers now."
+        return Item(code="present", verdict="warned", text=text)
 
     def _drill_items(self, robot: str, claim: Claim) -> Iterator[Item]:
         """Yield the item about the last Stop drill of a robot that blocks no start: none if there was
@@ -438,7 +469,21 @@ class RightsRegistry:
 
     def act(self, identity: Identity) -> None:
         """Note that a person has just done something, which shows that they are there."""
-        self._gone_at[identity.person.id] = anyio.current_time()
+        now = anyio.current_time()
+        self._gone_at[identity.person.id] = now
+        self.see(identity, now)
+
+    def see(self, identity: Identity, at: float) -> None:
+        """Note that a person had a visible page at this time, in seconds of the event loop. A program
+        shows nothing about its person."""
+        if identity.session is not None and identity.token is None:
+            person = identity.person.id
+            self._seen_at[person] = max(at, self._seen_at.get(person, at))
+
+    def seen_at(self, person: str) -> float | None:
+        """Return when a person last had a visible page, in seconds of the event loop; None if that is
+        not known."""
+        return self._seen_at.get(person)
 
     def require_present(self, person: str) -> Identity:
         """Return a person who has a page open. Raise Conflict for anybody else, who would not know
