@@ -48,7 +48,9 @@ site: build/help/index.html ## the documentation that is under Help in the page:
 ros: .venv-ros/.done ## what reaching robots over ROS 2 needs, on a machine without ROS: .venv-ros
 
 .PHONY: run
-run: setup ## start the editor and the runner, and open the page (ARGS="--port 9000 --no-open")
+run: .venv/.done frontend/dist/index.html ## start the editor and the runner, and open the page (ARGS="--port 9000 --no-open")
+	@# Where the documentation cannot be built, the product runs without Help.
+	@$(MAKE) --no-print-directory build/help/index.html || echo "» no Help in the page: it is built with the next make run"
 	@$(BIN)/action-assistant serve $(ARGS)
 
 .PHONY: dev
@@ -215,6 +217,10 @@ build: setup ## the wheel, with migrations, the built page and its help, in dist
 	@$(STEP) wheel $(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
+.PHONY: bundle
+bundle: build ## everything for a machine of this kind without a network: a tar file in dist/
+	@scripts/bundle $(BIN)/python "$$(ls -t dist/*.whl | head -1)"
+
 .PHONY: images
 images: ## build the container images of this commit with Docker, and write their tag into .env
 	@touch .env && sed -i -E '/^(IMAGE_VERSION|SOURCE_COMMIT)=/d' .env && scripts/build_version.py env >>.env
@@ -233,13 +239,13 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(LOCK) requirements/build.in --output-file requirements/build.txt
 	@$(LOCK) requirements/site.in --output-file requirements/site.txt
 
-.venv/.done: requirements/dev.txt pyproject.toml scripts/need
+.venv/.done: requirements/dev.txt pyproject.toml scripts/need scripts/packages
 	@scripts/need $(PYTHON)=python3 || exit 1
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version)." >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || scripts/need no-such-command=python3-venv
 	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	@$(STEP) "Python packages into .venv" $(BIN)/pip install --quiet --require-hashes --requirement requirements/dev.txt
+	@$(STEP) "Python packages into .venv" scripts/packages $(BIN)/python --require-hashes --requirement requirements/dev.txt
 	@$(BIN)/pip install --quiet --no-deps --no-build-isolation --editable .
 	@# Where interpreters may write no bytecode, every process of ours would compile all of it anew.
 	@$(BIN)/python -m compileall -q server tests
@@ -250,7 +256,7 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@scripts/need cmake=cmake ninja=ninja-build g++=g++ || exit 1
 	@test -x $(ROS)/python || $(PYTHON) -m venv .venv-ros
 	@$(STEP) "rclpy and Python packages into .venv-ros" \
-		$(ROS)/python -m pip install --quiet --require-hashes --requirement requirements/ros.txt
+		scripts/packages $(ROS)/python --require-hashes --requirement requirements/ros.txt
 	@$(ROS)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@$(STEP) "messages of TeMoto into .venv-ros" scripts/build-messages .venv-ros ros/temoto_msgs
 	@sha256sum requirements/ros.txt | cut -d " " -f 1 >$@
@@ -263,6 +269,11 @@ frontend/dist/index.html: frontend/node_modules/.done $(PAGE_SOURCES)
 	@$(STEP) "the page into frontend/dist" $(NPM) run --silent build
 	@touch $@
 
-build/help/index.html: .venv/.done $(HELP_SOURCES)
+# Nothing but Help needs what builds the documentation.
+.venv/.site: .venv/.done requirements/site.txt
+	@$(STEP) "what builds the help into .venv" scripts/packages $(BIN)/python --require-hashes --requirement requirements/site.txt
+	@touch $@
+
+build/help/index.html: .venv/.site $(HELP_SOURCES)
 	@$(STEP) "the help into build/help" $(BIN)/python -B docs/site/build.py build/help
 	@touch $@

@@ -1,9 +1,12 @@
 """Hooks, the development container and targets of make agree."""
 
 import json
+import os
 import re
 import shlex
+import socket
 import subprocess
+import sys
 from pathlib import Path
 
 import yaml
@@ -49,6 +52,38 @@ def test_a_step_of_make_is_one_line_unless_it_fails() -> None:
     failed = step("echo made; echo because >&2; exit 3")
     assert (failed.returncode, failed.stdout) == (3, "» the page\n")
     assert failed.stderr == "made\nbecause\n"
+
+
+def test_a_dead_index_of_packages_is_named_at_once_with_what_to_do(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as gone:
+        port = gone.getsockname()[1]
+    environment = {name: text for name, text in os.environ.items() if "PIP" not in name}
+    environment |= {
+        "PIP_INDEX_URL": f"http://me:secret@127.0.0.1:{port}/simple",
+        "PIP_CONFIG_FILE": os.devnull,
+    }
+    for name in ("http_proxy", "https_proxy", "all_proxy"):
+        environment.pop(name, None)
+        environment.pop(name.upper(), None)
+    words = [ROOT / "scripts" / "packages", sys.executable, "--target", tmp_path, "no-such-package"]
+    failed = subprocess.run(
+        list(map(str, words)), env=environment, capture_output=True, text=True, check=False
+    )
+    assert failed.returncode == 1
+    said = f"The index of Python packages does not answer: 127.0.0.1:{port} (Connection refused)."
+    assert said in failed.stderr
+    assert "`make bundle`" in failed.stderr
+    assert "Retrying" not in failed.stderr
+    assert "secret" not in failed.stderr.split("The index of", 1)[1]
+
+
+def test_running_needs_nothing_that_builds_the_documentation() -> None:
+    locked = (ROOT / "requirements" / "dev.txt").read_text()
+    assert not re.findall(
+        r"^(sphinx|furo|myst-parser|docutils|accessible-pygments)", locked, re.MULTILINE
+    )
+    (needed,) = re.findall(r"^run: (.*?) ##", MAKEFILE, re.MULTILINE)
+    assert needed.split() == [".venv/.done", "frontend/dist/index.html"]
 
 
 def test_every_target_that_is_listed_has_a_word_on_what_it_does() -> None:

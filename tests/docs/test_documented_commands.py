@@ -29,6 +29,7 @@ MAKEFILE: Final = (ROOT / "Makefile").read_text()
 LISTED: Final = {
     "make": "builds, tests or serves everything: CI does, and tests look at what comes of it",
     "git": "needs the place that the source code comes from",
+    "./install": "is in what `make bundle` writes",
     "cd": "belongs to the line that it stands in",
     "export": "sets the shell of whoever types it; these tests set the same",
     "source": "needs a ROS 2 of the distribution: tests/ros lays one out",
