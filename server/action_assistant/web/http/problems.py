@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problem details, in one shape for every route."""
 
 import logging
+import time
 from http import HTTPStatus
 from typing import Annotated, Any, Final
 
@@ -10,11 +11,13 @@ from litestar.exceptions import HTTPException, ValidationException
 from litestar.handlers import HTTPRouteHandler
 from litestar.types import ExceptionHandlersMap
 
-from action_assistant.errors import Refused
+from action_assistant.errors import Refused, Unavailable
 from action_assistant.logs import request_id
 from action_assistant.safe_text import hold_names
 
 log: Final = logging.getLogger(__name__)
+
+_AGAIN_S: Final = 10.0
 
 PROBLEM_JSON: Final = "application/problem+json"
 #: A key of a route's `opt`: the bytes of a body that it takes, where more may come over the wire.
@@ -59,7 +62,7 @@ def problem_handlers() -> ExceptionHandlersMap:
     """Return the functions that answer for exceptions, as `Litestar(exception_handlers=…)` takes
     them."""
     return {
-        Refused: _refused,
+        Refused: _Refusals().answer,
         HTTPException: _framework,
         RecursionError: _too_deep,
         Exception: _unexpected,
@@ -75,11 +78,27 @@ def _response(details: ProblemDetails, headers: dict[str, str] | None = None) ->
     )
 
 
-def _refused(request: Request[Any, Any, Any], error: Refused) -> Response[bytes]:
-    log.info("refused %s: %s", request.scope["path"], error.detail)
-    return _response(
-        ProblemDetails(error.type, error.title, error.status, error.detail, error.where)
-    )
+class _Refusals:
+    """Answers and logs refusals. While a part is away the same sentence is logged once in ten
+    seconds, since clients try again and again."""
+
+    def __init__(self) -> None:
+        self._away: dict[str, float] = {}  # when each sentence was logged
+
+    def answer(self, request: Request[Any, Any, Any], error: Refused) -> Response[bytes]:
+        """Return the answer to a request that was refused with this error."""
+        level = logging.DEBUG if self._is_known(error) else logging.INFO
+        log.log(level, "refused %s: %s", request.scope["path"], error.detail)
+        return _response(
+            ProblemDetails(error.type, error.title, error.status, error.detail, error.where)
+        )
+
+    def _is_known(self, error: Refused) -> bool:
+        if not isinstance(error, Unavailable):
+            return False
+        now = time.monotonic()
+        self._away = {each: at for each, at in self._away.items() if now - at < _AGAIN_S}
+        return self._away.setdefault(error.detail, now) != now
 
 
 def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
