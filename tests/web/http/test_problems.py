@@ -24,7 +24,9 @@ def test_a_part_that_is_away_is_logged_once_however_often_clients_try_again(
         raise BadInput("No graph has this name.")
 
     caplog.set_level("INFO", problems.log.name)
-    app = Litestar([store, wrong], exception_handlers=problems.problem_handlers())
+    app = Litestar(
+        [store, wrong], exception_handlers=problems.problem_handlers(), logging_config=None
+    )
     with TestClient(app) as client:
         for _ in range(5):
             assert client.get("/store", params={"why": "It is down."}).status_code == 503
