@@ -24,7 +24,8 @@ function importsOf(file: string): string[] {
     const base = relative(SRC, resolve(SRC, dirname(file), path)).replaceAll("\\", "/");
     const target = [".ts", ".tsx", "/index.ts"].map((end) => base + end).find((f) => known.has(f));
     if (target !== undefined) found.push(target);
-    else if (!path.endsWith(".css")) throw new Error(`${file} imports ${path}, which is not there`);
+    else if (!/\.(css|json)$/.test(path))
+      throw new Error(`${file} imports ${path}, which is not there`);
   }
   return found;
 }

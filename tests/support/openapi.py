@@ -1,4 +1,5 @@
-"""The OpenAPI documents of both processes: `python -m support.openapi FOLDER` writes them."""
+"""The OpenAPI documents of both processes, and the ready-made actions: `python -m support.openapi FOLDER`
+writes them for the page."""
 
 import json
 import sys
@@ -9,6 +10,7 @@ from typing import Any
 from action_assistant.editor import app as editor
 from action_assistant.runner import app as runner
 from action_assistant.settings import EditorSettings, RunnerSettings
+from action_assistant.umrf.questions import READY_MADE, title_of
 
 
 def documents(data: Path) -> dict[str, dict[str, Any]]:
@@ -23,15 +25,32 @@ def documents(data: Path) -> dict[str, dict[str, Any]]:
 
 
 def texts(data: Path) -> dict[str, str]:
-    """Return the documents as the texts that are kept, by file name, without the version, which
-    releases change."""
+    """Return the documents and the ready-made actions as the texts that are kept, by file name, without
+    the version, which releases change."""
     found = documents(data)
     for document in found.values():
         document["info"]["version"] = ""
+    kept = {f"{name}.openapi.json": document for name, document in found.items()}
     return {
-        f"{name}.openapi.json": json.dumps(document, indent=1, ensure_ascii=False) + "\n"
-        for name, document in found.items()
+        name: json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+        for name, content in {**kept, "ready-made.json": ready_made()}.items()
     }
+
+
+def ready_made() -> list[dict[str, Any]]:
+    """Return the ready-made actions, in the form in which the page places actions."""
+    return [
+        {
+            "name": each.name,
+            "title": title_of(each.name),
+            "description": each.description,
+            **{
+                side: [{"path": one.path, "text": one.text} for one in parameters]
+                for side, parameters in (("inputs", each.inputs), ("outputs", each.outputs))
+            },
+        }
+        for each in READY_MADE
+    ]
 
 
 if __name__ == "__main__":

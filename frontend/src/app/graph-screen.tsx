@@ -22,6 +22,7 @@ import { serverNow } from "../clock/server-clock";
 import { scriptOf } from "../dry-run/script";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, useEditorSummary } from "../editor/editor";
+import { READY_TEMPLATES } from "../graph/edit";
 import { isReadyMade } from "../graph/questions";
 import { robotNames } from "../graph/robots";
 import { templatesOf, useKnownActions, usePlaceable } from "../home/known-actions";
@@ -158,7 +159,7 @@ function Inside({ id }: { id: string }) {
   const { person, visit } = usePerson();
   const { create, choose } = useNewGraphs();
   const placeable = usePlaceable(id);
-  const known = useMemo(() => templatesOf(placeable), [placeable]);
+  const known = useMemo(() => [...READY_TEMPLATES, ...templatesOf(placeable)], [placeable]);
   const { going, choose: chooseRun, live, run, label, unsure, inside } = useShownRun(id);
   const { runner } = useLive();
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);

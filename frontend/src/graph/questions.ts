@@ -1,10 +1,9 @@
 /** The ready-made actions that people answer, or for which the runner waits. */
 
+import templates from "../api/schema/ready-made.json";
+
 /** Names by which the runner knows them. */
-const READY_MADE: ReadonlySet<string> = new Set([
-  ...["AaConfirm", "AaChoose", "AaAskText", "AaAskNumber", "AaAskPhoto"],
-  ...["AaWait", "AaUntil"],
-]);
+const READY_MADE: ReadonlySet<string> = new Set(templates.map(({ name }) => name));
 
 const WAITS: ReadonlySet<string> = new Set(["AaWait", "AaUntil"]);
 

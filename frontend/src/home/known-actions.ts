@@ -11,6 +11,7 @@ import {
 } from "../api/library";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/field-words";
+import { isReadyMade } from "../graph/questions";
 
 export interface KnownAction {
   readonly template: NewAction;
@@ -105,7 +106,9 @@ export function usePlaceable(current: string | undefined): Placeable & { ready: 
       };
       return { graph, template };
     });
-    return { ...placeable(actions, graphs, current), ready };
+    // Ready-made ones are offered as such, whether graphs use them or not.
+    const others = actions.filter(({ template }) => !isReadyMade(template));
+    return { ...placeable(others, graphs, current), ready };
   }, [actions, data, current, ready]);
 }
 

@@ -11,7 +11,7 @@ import { refreshLibrary } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import { actionDrag } from "../canvas/action-drag";
-import type { NewAction } from "../graph/edit";
+import { type NewAction, READY_TEMPLATES } from "../graph/edit";
 import { LateOpening } from "../ui/late-opening";
 import { lazyPart } from "../ui/lazy-part";
 import { LongList } from "../ui/long-list";
@@ -37,8 +37,16 @@ const bare = (template: NewAction): KnownAction => ({
   gives: [],
 });
 
+const READY_ROWS: readonly KnownAction[] = READY_TEMPLATES.map(bare);
+
 const fits = (search: string, template: NewAction): boolean =>
-  matchesSearch(search, template.name, template.description, signature(template));
+  matchesSearch(
+    search,
+    template.title ?? "",
+    template.name,
+    template.description,
+    signature(template),
+  );
 
 function RobotRow({ has, onPlace }: { has: RobotAction; onPlace: Place }) {
   const client = useQueryClient();
@@ -91,6 +99,23 @@ interface RobotsProps {
   search: string;
   known: ReadonlySet<string>;
   onPlace: Place;
+}
+
+/** The ready-made actions, which no robot carries out. */
+function ReadyMade({ search, onPlace }: { search: string; onPlace: Place }) {
+  const found = READY_ROWS.filter(({ template }) => fits(search, template));
+  if (found.length === 0) return null;
+  return (
+    <section aria-label="Ask people, or wait">
+      <div className={style.heading}>
+        <h2>Ask people, or wait</h2>
+      </div>
+      <p className={style.how}>No robot carries these out: a led run asks people, or waits.</p>
+      {found.map((known) => (
+        <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
+      ))}
+    </section>
+  );
 }
 
 /** The other graphs, each as one action that runs all of it. */
@@ -168,6 +193,7 @@ export function PlaceableActions({ search: typed, current, onPlace }: Props) {
         onPlace={onPlace}
       />
       <Graphs graphs={others} onPlace={onPlace} />
+      <ReadyMade search={search} onPlace={onPlace} />
     </>
   );
 }
@@ -209,7 +235,7 @@ export const ActionRow = memo(function ActionRow({ known, note = "", onPlace }: 
       >
         <span className={style.grip} aria-hidden />
         <span className="fill">
-          <span className={style.name}>{template.name}</span>
+          <span className={style.name}>{template.title ?? template.name}</span>
           <span className={style.sub}>
             {signature(template)}
             {usedIn.length > 0 && ` · used in ${usedIn.length}`}

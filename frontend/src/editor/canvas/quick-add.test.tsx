@@ -5,11 +5,12 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import type { EditorContext } from "../../edit-actions/editor-context";
+import { READY_TEMPLATES } from "../../graph/edit";
 import { graphNow } from "../../graph/edit/document-writes";
 import { EMPTY_GRAPH } from "../../graph/model";
 import { boundedPart } from "../../ui/lazy-part";
 import { TypingField } from "../../ui/typed-ahead";
-import { QuickAdd } from "./quick-add";
+import { candidates, QuickAdd } from "./quick-add";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 vi.stubGlobal("matchMedia", () => ({
@@ -114,4 +115,18 @@ test("Enter that ends a composition adds nothing, the next one does", async () =
   expect(names()).toEqual([]);
   enter();
   expect(names()).toEqual(["Drive"]);
+});
+
+test("a ready-made action is found by its title, and comes last while nothing is typed", () => {
+  const known = [...READY_TEMPLATES, { name: "Drive" }, { name: "Work" }];
+  expect(
+    candidates(known, "")
+      .map(({ name }) => name)
+      .slice(0, 2),
+  ).toEqual(["Drive", "Work"]);
+  expect(candidates(known, "conf").map(({ name, title = "" }) => [name, title])).toEqual([
+    ["AaConfirm", "Confirm"],
+    ["conf", ""],
+  ]);
+  expect(candidates(known, "aaw")[0]?.name).toBe("AaWait");
 });

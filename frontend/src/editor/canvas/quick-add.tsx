@@ -36,14 +36,18 @@ const MOST = 8;
  */
 export function candidates(known: readonly NewAction[], search: string): NewAction[] {
   const wanted = search.trim().toLowerCase();
-  const rank = (name: string) => {
-    const lower = name.toLowerCase();
-    return lower.startsWith(wanted) ? 0 : lower.includes(wanted) ? 1 : 2;
+  const label = ({ name, title }: NewAction) => title ?? name;
+  const rank = ({ name, title = name }: NewAction) => {
+    // Ready-made ones come after those of the library, unless somebody asks for them.
+    if (wanted === "") return name === title ? 0 : 1;
+    const words = [name.toLowerCase(), title.toLowerCase()];
+    if (words.some((each) => each.startsWith(wanted))) return 0;
+    return words.some((each) => each.includes(wanted)) ? 1 : 2;
   };
   const fitting = known
-    .map((action) => ({ action, rank: rank(action.name) }))
+    .map((action) => ({ action, rank: rank(action) }))
     .filter(({ action, rank: r }) => r < 2 || action.description?.toLowerCase().includes(wanted))
-    .sort((a, b) => a.rank - b.rank || a.action.name.localeCompare(b.action.name))
+    .sort((a, b) => a.rank - b.rank || label(a.action).localeCompare(label(b.action)))
     .slice(0, MOST);
   const isExact = (action: NewAction) => action.name.toLowerCase() === wanted;
   const exact = fitting.some(({ action }) => isExact(action));
@@ -161,7 +165,9 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
             >
               <span className="row gap-4px weight-500">
                 {isNew && <IconPlus size={13} aria-hidden />}
-                {isNew ? `New action “${isolated(template.name)}”` : template.name}
+                {isNew
+                  ? `New action “${isolated(template.name)}”`
+                  : (template.title ?? template.name)}
               </span>
               {template.description && (
                 <span className="block truncate faint-11_5">{template.description}</span>

@@ -208,6 +208,11 @@ interface ArrowDialogProps {
 
 const FRESH = "new ";
 
+function originOf({ ofGraph, title }: NewAction): string {
+  if (ofGraph) return "a graph";
+  return title === undefined ? "another use, from the library" : "ready-made";
+}
+
 /** Return matching targets: on the canvas, in the library, or an action that is new. */
 export function targetsOf(
   here: readonly Option[],
@@ -220,10 +225,8 @@ export function targetsOf(
     const isNew = !known.includes(template);
     return {
       id: FRESH + template.name,
-      label: isNew ? `New action “${isolated(template.name)}”` : template.name,
-      sub: isNew
-        ? ""
-        : `${template.ofGraph ? "a graph" : "another use, from the library"} · ${template.description ?? ""}`,
+      label: isNew ? `New action “${isolated(template.name)}”` : (template.title ?? template.name),
+      sub: isNew ? "" : `${originOf(template)} · ${template.description ?? ""}`,
       icon: <IconPlus size={16} aria-hidden />,
     };
   });

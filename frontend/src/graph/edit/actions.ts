@@ -1,6 +1,7 @@
 /** Edits of actions: add, remove, rename, fields. */
 
 import type * as Y from "yjs";
+import templates from "../../api/schema/ready-made.json";
 import {
   actionKey,
   bundleOfKey,
@@ -47,9 +48,14 @@ export interface NewAction {
   readonly outputs?: readonly Parameter[];
   readonly position?: Position;
   readonly extra?: Extra;
+  /** The name of a ready-made action for people. It is not stored. */
+  readonly title?: string;
   /** True if the action stands for a whole graph of that name. It is not stored. */
   readonly ofGraph?: true;
 }
+
+/** Templates of the ready-made actions, which people answer, or for which the runner waits. */
+export const READY_TEMPLATES: readonly NewAction[] = templates;
 
 /** Adds an action under the lowest free number of its name and returns its key. */
 export function addAction(doc: Y.Doc, action: NewAction): Key {
