@@ -331,6 +331,46 @@ async def test_whoever_gets_a_run_has_the_whole_time_from_then_on() -> None:
         assert await ended(control, run) == "stopped"
 
 
+@virtual
+async def test_a_program_that_takes_and_drops_the_baton_gives_a_run_no_time() -> None:
+    lab = Lab(LONG)
+    token = Identity(BEN.person, token=Token("t", "Script", BEN.person, frozenset({"operate"})))
+    async with lab.runner() as control, anyio.create_task_group() as tasks:
+        await rules(control, "David", given=Rules(baton=True, page_presence=RULE))
+        await control.rights.take("David", ANN, author(ANN))
+        page = Page(control)
+        tasks.start_soon(page.run)
+        run = await whole(control)
+        await anyio.sleep(5)
+        page.is_visible = False
+        at = anyio.current_time()
+        while control.open[run].run.desired == "running" and anyio.current_time() - at < 60:
+            with suppress(Conflict):
+                await control.rights.take("David", token, author(token), "Again.")
+            await anyio.sleep(2)
+            with suppress(Conflict):
+                await control.rights.drop("David", token, author(token))
+            await anyio.sleep(2)
+        assert anyio.current_time() - at < 26
+        assert await ended(control, run) == "stopped"
+        tasks.cancel_scope.cancel()
+
+
+@virtual
+async def test_a_robot_that_is_registered_again_is_watched_again() -> None:
+    lab = Lab(LONG)
+    async with lab.runner() as control:
+        await rules(control, "David")
+        await anyio.sleep(1)
+        known = control.robots.registration("David")
+        await control.remove("David", author(ANN))
+        await anyio.sleep(5)
+        await control.register(known, author(ANN))
+        await until(lambda: control.robots.robot("David").heard_at is not None)
+        run = await whole(control)
+        assert await ended(control, run) == "stopped"
+
+
 class Starts(list[Any]):
     """The messages that a robot got, with their times."""
 

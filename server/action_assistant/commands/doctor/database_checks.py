@@ -316,9 +316,9 @@ def _older(database: Database, connection: Connection, current: str) -> tuple[st
 
 def copies_fit(place: Installation) -> Iterator[Diagnostic]:
     """Check that there is room for the copies of both databases together, which the next start
-    makes before it changes their tables. Yield the result; a database that cannot be read is
-    skipped, since the checks of the databases report that."""
-    data, sizes = place.data, list[int]()
+    makes before it changes their tables. Yield the result; nothing where one of them cannot
+    be read, which the checks of the databases report."""
+    data, sizes, is_known = place.data, list[int](), True
 
     def look(database: Database, connection: Connection) -> None:
         current = max(recognize(connection), default="")
@@ -328,12 +328,16 @@ def copies_fit(place: Installation) -> Iterator[Diagnostic]:
     for url in _databases(place):
         database = database_of(url)
         question = partial(look, database)
-        with suppress(CannotStart, TimeoutError):
+        try:
             if database.is_local:
                 database.look(question)
             else:
                 ask_once(url, question)
+        except (CannotStart, TimeoutError):
+            is_known = False
     where = data / before_upgrade.FOLDER
+    if not is_known:  # what it needs is not known; the checks of the databases say why
+        return
     if not sizes:
         yield fine(where, "The next start changes no tables, and makes no copy.")
         return

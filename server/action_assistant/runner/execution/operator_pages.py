@@ -6,7 +6,7 @@ that somebody looks. Stop itself knows nothing of this, and a page that comes ba
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
 import anyio
@@ -24,24 +24,25 @@ log: Final = logging.getLogger(__name__)
 _POLL_S: Final = 0.25
 _STALL_S: Final = 1.0  # a look that is so late: this process stood still
 _FRESH_S: Final = 2.0  # in which pages answer anew after that
+_REST_S: Final = 10.0  # between two such times: stalls that repeat do not switch the watch off
 _MOST_STALLS: Final = 100
 
 
 class _Duty:
     """The people of a run of whom one has to have a visible page for a robot. `began`: since when the
-    robot asks for it in this run; `since`: since when it asks these people, in seconds of the event
-    loop."""
+    robot asks for it in this run; `seen`: when one of those who had to be there last was, in seconds of
+    the event loop. Whoever takes a baton on a page is there at that moment; a program that does so
+    gives the run no time."""
 
     def __init__(self, rule: PagePresence, now: float) -> None:
         self.rule = rule
-        self.began = self.since = now
+        self.began = self.seen = now
         self.people: tuple[PersonRef, ...] = ()
 
-    def ask(self, people: tuple[PersonRef, ...], now: float) -> None:
-        """Ask these people from now on; whoever is new gets the whole time."""
-        if {each.id for each in people} != {each.id for each in self.people}:
-            self.since = now
+    def ask(self, people: tuple[PersonRef, ...], seen: Iterable[float | None]) -> None:
+        """Ask these people from now on. `seen`: when each of them was there last."""
         self.people = people
+        self.seen = max([self.seen, *(at for at in seen if at is not None)])
 
 
 class OperatorPages:
@@ -107,7 +108,8 @@ class OperatorPages:
         if is_stalled:
             log.warning("the runner stood still for %.1f s: pages are asked anew", stood_s)
             self._stalls.append((now, stood_s))
-            self._fresh_until = now + _FRESH_S
+            if now >= self._fresh_until + _REST_S:
+                self._fresh_until = now + _FRESH_S
         before, self._duties = self._duties, {}
         for opened, robot, rule in self._asking():
             key = opened.run.id, robot
@@ -115,7 +117,10 @@ class OperatorPages:
             if duty is None or duty.rule != rule:
                 duty = _Duty(rule, now)
             self._duties[key] = duty
-            duty.ask(self._with_holder(robot, _responsible(opened.run)), now)
+            people = self._with_holder(robot, _responsible(opened.run))
+            # Who handed it over since the last look was there then.
+            asked = (*duty.people, *people)
+            duty.ask(people, [self._rights.seen_at(each.id) for each in asked])
             try:
                 if is_stalled:
                     text = f"This runner stood still for {stood_s:.0f} s: visible pages are asked anew."
@@ -129,7 +134,10 @@ class OperatorPages:
         """Yield the runs that go on, with each robot that asks for a visible page."""
         for opened in tuple(self._runs.by_id.values()):
             run = opened.run
-            if opened.is_led or run.end is not None or run.desired == "stopped":
+            if run.end is not None or run.desired == "stopped":
+                continue
+            # A piece is watched with its run, unless that could not be read after a restart.
+            if opened.is_led and run.piece is not None and run.piece.run in self._runs.by_id:
                 continue
             for robot in run.robots:
                 rule = self._rights.page_presence_of(robot)
@@ -137,7 +145,7 @@ class OperatorPages:
                     yield opened, robot, rule
 
     def _act(self, opened: OpenRun, robot: str, duty: _Duty) -> None:
-        missing_s = self._missing_s(duty.people, duty.since)
+        missing_s = self._missing_s(duty.people, duty.seen)
         rule = duty.rule
         if missing_s >= rule.wait_s and opened.run.led is not None:
             self._hold(opened.run.id, self._why(robot, duty.people, rule.wait_s))

@@ -241,6 +241,7 @@ class ExecutionService:
 
     def _robots_changed(self) -> None:
         self.hardware_stops.look()
+        self.operator_pages.look()
         for watcher in self._robot_watchers:
             watcher()
 

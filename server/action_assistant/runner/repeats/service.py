@@ -470,7 +470,7 @@ class Repeats:
                 what = f" of {robot}" if robot else "" if run else " of everything"
                 text = f"{who} pressed Stop{what}."
                 if author.id == RUNNER.id:
-                    text = f"{robot} was stopped by {who}."
+                    text = f"{robot or 'A run of it'} was stopped by {who}."
                 self._meet(record, _Reason("stop", text, author, run))
 
     def _run_changed(self, opened: OpenRun) -> None:

@@ -416,6 +416,7 @@ class RightsRegistry:
         """Hand the baton of a robot to a person who has a page open. Raise Conflict or Forbidden as
         `RobotRights.hand` does, Unavailable if that could not be stored: then nobody holds it."""
         self._robots.registration(robot)
+        self.act(by)
         receiver = self.require_present(to)
         event = self.of(robot).hand(by, author, receiver, self._runtime.clock_us())
         await self._carry_out({robot: (event,)}, author.id, {robot: receiver})
@@ -425,6 +426,7 @@ class RightsRegistry:
     ) -> dict[str, tuple[RightsEvent, ...]]:
         """Return the events by which all batons of these robots go to one person together with a run.
         Raise Conflict or Forbidden if one of them may not; nothing has changed then."""
+        self.act(by)
         at = self._runtime.clock_us()
         names = self.with_baton(robots)
         if not names:

@@ -241,14 +241,13 @@ class Domain:
             )
 
         def share(message: Message) -> None:
-            for listener in self._stop_listeners[place]:
+            for listener in self._stop_listeners.get(place, ()):
                 listener(message)
 
         signal = _StopTopic(self._node, *place, leave)
         if place not in self._stop_listeners:
-            self._stop_listeners[place] = ()
             self._node.create_subscription(kind, topic, share, stop_qos())
-        self._stop_listeners[place] += (heard,)
+        self._stop_listeners[place] = (*self._stop_listeners.get(place, ()), heard)
         return signal
 
     # --- what comes by itself -----------------------------------------------------------------
