@@ -10,16 +10,16 @@ from action_assistant.errors import RequestRefused
 from action_assistant.safe_text import one_line
 
 
-def add_questions(more: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the two commands to those of `runs`."""
+def add_questions(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the two commands to `commands`, the sub-commands of `runs`."""
     asks = command(
-        more, "questions", "what runs ask people now, or what one run has asked", "RUN --json"
+        commands, "questions", "what runs ask people now, or what one run has asked", "RUN --json"
     )
     asks.add_argument("run", nargs="?", default="", metavar="RUN", help="id of the run; else all")
     asks.add_argument("--json", action="store_true", help="as JSON, for programs")
     asks.set_defaults(handler=_questions)
     answers = command(
-        more,
+        commands,
         "answer",
         "answer a question of a led run: its robots may begin to move at once",
         "RUN QUESTION --yes",

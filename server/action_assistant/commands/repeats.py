@@ -80,8 +80,10 @@ def _values(one: "AskedInput", text: str) -> list[Any]:
 def open_repeat(
     server: Server, start: dict[str, Any], grid: list[dict[str, Any]], options: argparse.Namespace
 ) -> int:
-    """Open a repeat of a start, and return the exit code. In the simulator it goes on by itself, and the
-    command waits for its end unless it need not."""
+    """Open a repeat, print its id, and return the exit code. `start`: the body of a request to
+    start; `grid`: the values of inputs, by `grid_of`. If only the simulator plays, the runner
+    starts each next run by itself, and the command waits for the end of the repeat, except with
+    `--no-wait`. On robots a person starts each run, and the command returns at once."""
     robots = set(start.get("robots", {}).values()) or {start["engine"]}
     by_itself = robots <= {"simulator"}
     wanted = {
@@ -132,16 +134,16 @@ def _line(cell: dict[str, Any]) -> str:
     return f"{cell['cell']}  {end}{result}  {values}".rstrip()
 
 
-def add_repeats(more: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands about repeats to those of `runs`."""
-    lists = command(more, "repeats", "the repeats, or the runs of one", "REPEAT --csv")
+def add_repeats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the commands about repeats to `commands`, the sub-commands of `runs`."""
+    lists = command(commands, "repeats", "the repeats, or the runs of one", "REPEAT --csv")
     lists.add_argument("repeat", nargs="?", default="", metavar="REPEAT", help="its id; else all")
     form = lists.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="as JSON, for programs")
     form.add_argument("--csv", action="store_true", help="with REPEAT: its table as CSV")
     lists.set_defaults(handler=_repeats)
     nexts = command(
-        more,
+        commands,
         "next",
         "say that everything is set back, and start the next run of a repeat: its robots may begin to "
         "move at once; wait for its end",
@@ -157,12 +159,12 @@ def add_repeats(more: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
     )
     nexts.set_defaults(handler=_next)
     ends = command(
-        more, "stop-repeating", "close a repeat; it stops no run (to stop one: stop)", "REPEAT"
+        commands, "stop-repeating", "close a repeat; it stops no run (to stop one: stop)", "REPEAT"
     )
     ends.add_argument("repeat", metavar="REPEAT", help="id of the repeat")
     ends.set_defaults(handler=_close)
     again = command(
-        more,
+        commands,
         "look-again",
         "open a closed repeat again, if a look at its next start blocks nothing",
         "REPEAT",

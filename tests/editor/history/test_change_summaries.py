@@ -43,7 +43,7 @@ async def test_the_summary_of_a_lone_editor_is_the_difference_of_the_whole_graph
     await index.upto(GRAPH)
     first = random.Random(seed).randrange(2, len(held))
     changes = await index.value(index_queries.between, GRAPH, first - 1, len(held), _ALL)
-    base = await index.value(index_queries.at, GRAPH, first - 1, of=_touched(changes))
+    base = await index.value(index_queries.at, GRAPH, first - 1, owners=_touched(changes))
     (found,) = told(base, changes, [Stretch("ada", first, len(held))])
     before, after = read_maps(held[first - 2]), read_maps(held[-1])
     sought = difference((0, before), (0, after))

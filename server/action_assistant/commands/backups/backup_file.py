@@ -107,15 +107,15 @@ class Packer:
         self._write(name, content)
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
-    def close(self, about: BackupManifest, target: Path, prove: Callable[[Path], None]) -> None:
-        """Add the manifest (`about`), finish the file, verify it by `prove`, and rename it to
-        `target`."""
-        self._write(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
+    def close(self, manifest: BackupManifest, target: Path, verify: Callable[[Path], None]) -> None:
+        """Add the manifest, finish the file, verify it, and rename it to `target`. `verify` raises
+        an error if the file at its path is damaged; the file then keeps its temporary name."""
+        self._write(_ABOUT, msgspec.json.format(msgspec.json.encode(manifest)))
         self._zip.close()
         self._raw.flush()
         os.fsync(self._raw.fileno())
         self._raw.close()
-        prove(self._part)
+        verify(self._part)
         self._part.replace(target)
         sync(target.parent)
 

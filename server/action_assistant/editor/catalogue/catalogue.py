@@ -314,28 +314,28 @@ class Catalogue:
     async def _add(
         self,
         update: bytes,
-        of: GraphInfo,
-        about: list[Draft],
+        info: GraphInfo,
+        events: list[Draft],
         author: str,
         file: Draft | None = None,
     ) -> GraphView:
         """Store a new graph, and return it as lists show it. `update`: its document as one Yjs
-        update; `of`: facts for lists; `about`: events about it; `file`: the event with the imported
-        file. A large file is stored first, in a commit of its own, since edits of others wait for
-        every commit; else all is stored in one commit."""
+        update; `info`: its facts for lists; `events`: events about it; `file`: the event with the
+        imported file. A large file is stored first, in a commit of its own, since edits of others
+        wait for every commit; else all is stored in one commit."""
         made = random_id()
         document = Draft(h.UPDATED, author, update)
         if file is not None and len(file.body) > _LARGE_FILE:
             await self._journal.append(h.about_stream(made), [file])
         elif file is not None:
-            about = [*about, file]
+            events = [*events, file]
         await self._journal.append_all(
             [
-                Addition(h.about_stream(made), tuple(about)),
+                Addition(h.about_stream(made), tuple(events)),
                 Addition(h.graph_stream(made), (document,)),
             ]
         )
-        self._checks.made(made, update, of)
+        self._checks.made(made, update, info)
         await self._on_made()
         return await self.get(made)
 

@@ -181,11 +181,11 @@ class GraphChecks:
             found = self._digests.put(key, await self._reader.ask(contents.digest_at, sight))
         return found
 
-    def made(self, graph: str, state: bytes, about: GraphInfo) -> None:
-        """Remember the state of a new graph and its result `about`, so that neither has to be
+    def made(self, graph: str, state: bytes, info: GraphInfo) -> None:
+        """Remember the state of a new graph and its facts (`info`), so that neither has to be
         computed again."""
         self._reader.made(graph, state)
-        self.facts.put(graph, Facts(1, 1, about))
+        self.facts.put(graph, Facts(1, 1, info))
 
     async def summary(self, graph: str, newest: int) -> GraphSummary:
         """Return what lists show of a graph, up to its newest change (`newest`: its number). The
@@ -218,8 +218,8 @@ class GraphChecks:
         return hopeless is not None and hopeless[0] >= newest
 
     def compute_later(self, newest: Mapping[str, int]) -> None:
-        """Compute the facts about graphs in the background: `newest` has the number of the newest
-        change of each, by its id."""
+        """Have the facts about graphs computed in the background. `newest`: the number of the
+        newest change of each of these graphs, by the id of the graph."""
         if newest:
             self._later |= newest
             self._idle.clear()
@@ -324,8 +324,9 @@ class GraphChecks:
     async def _known_names(
         self, documents: Mapping[str, tuple[int, DocumentKind]]
     ) -> dict[str, str]:
-        """Return the names of those documents that need not be read, by id. `documents`: the newest
-        change and the kind of each. Raise Unavailable if the journal cannot be read."""
+        """Return the names that are known without reading the documents, by id. `documents`: the
+        newest change and the kind of each document. Raise Unavailable if the journal cannot be
+        read."""
         await self.facts.recall(documents)
         found: dict[str, str] = {}
         for graph, (newest, kind) in documents.items():

@@ -122,23 +122,25 @@ def overwritten_of_key(
 
 
 def at(
-    connection: Connection, graph: str, seq: int, of: Collection[str] | None = None
+    connection: Connection, graph: str, seq: int, owners: Collection[str] | None = None
 ) -> list[LoggedChange]:
     """Return, for each key of a graph that has a value after the change `seq`, the change that gave
-    it; only for keys of the owners `of` (actions, arrows …), None for all."""
-    if of is None:
+    it; only for keys of `owners` (actions, arrows …), None for all."""
+    if owners is None:
         return _changes(connection, _last(graph, seq).where(_c.after.is_not(None)))
-    return [each for each in latest(connection, graph, seq, of) if each.after is not None]
+    return [each for each in latest(connection, graph, seq, owners) if each.after is not None]
 
 
-def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) -> list[LoggedChange]:
+def latest(
+    connection: Connection, graph: str, seq: int, owners: Collection[str]
+) -> list[LoggedChange]:
     """Return the last change of each key of a graph up to the change `seq`, also of keys that no
-    longer exist. Only keys of the owners `of` count; an owner is what a key describes, such as an
-    action or a relation (`owner_of`)."""
-    owners = sorted(of)
+    longer exist. Only keys of `owners` count; an owner is the thing that a key describes, such as
+    an action or a relation (`owner_of`)."""
+    wanted = sorted(owners)
     found: list[LoggedChange] = []
-    for start in range(0, len(owners), _OWNERS):
-        some = _c.owner.in_(owners[start : start + _OWNERS])
+    for start in range(0, len(wanted), _OWNERS):
+        some = _c.owner.in_(wanted[start : start + _OWNERS])
         found += _changes(connection, _last(graph, seq, some))
     return found
 

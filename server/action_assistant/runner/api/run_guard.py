@@ -150,10 +150,12 @@ async def is_seen_by_all(services: RunnerServices, run: str, graph: str) -> bool
     return of is not None and not unseen.hides(of)
 
 
-def shown(services: RunnerServices, connection: _Connection, view: _View, of: RunGraphs) -> _View:
-    """Return the view of a run as its caller may see it."""
+def shown(
+    services: RunnerServices, connection: _Connection, view: _View, graphs: RunGraphs
+) -> _View:
+    """Return the view of a run as its caller may see it. `graphs`: the graphs of the run."""
     unseen = unseen_by(services, connection)
-    return view if unseen is None or not unseen.hides(of) else views.hidden(view)
+    return view if unseen is None or not unseen.hides(graphs) else views.hidden(view)
 
 
 def require_all_on_robot(services: RunnerServices, connection: _Connection) -> None:

@@ -130,9 +130,9 @@ def with_verdict(engine: str, items: Sequence[Item], digest: str = "", tree: str
     return Preflight(engine, digest, tree, tuple(items), tuple(codes), never)
 
 
-def with_items(look: Preflight, more: Sequence[Item]) -> Preflight:
+def with_items(look: Preflight, warnings: Sequence[Item]) -> Preflight:
     """Return a pre-flight with more items, which only warn."""
-    return msgspec.structs.replace(look, items=(*look.items, *more))
+    return msgspec.structs.replace(look, items=(*look.items, *warnings))
 
 
 def with_order(look: Preflight, approval: Item, order: str) -> Preflight:
@@ -574,8 +574,9 @@ def _graphs_in_places_of_actions(
     view: EngineView, graph: Graph, pinned: Mapping[str, Graph]
 ) -> tuple[Item, ...]:
     """Return the item about actions that are graphs in the index of the engine and none in this
-    version; empty without any. Their pieces would have the same name at each visit, and an engine
-    aborts when it starts a name with a sub-graph again (docs/decisions/026-names-that-are-held.md)."""
+    version; () if there are no such actions. Their pieces would have the same name at each visit,
+    and an engine aborts when it starts a name with a sub-graph again
+    (docs/decisions/026-names-that-are-held.md)."""
     names = {each.name for each in graph.actions if not each.missing}
     known = view.index.graphs.keys() - view.index.actions.keys() - pinned.keys()
     taken = sorted(names & known)
