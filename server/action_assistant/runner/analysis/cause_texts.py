@@ -168,8 +168,9 @@ def _command_in_words(cause: ForeignCause) -> str:
 
 
 def short_name(run: Run, full_name: str) -> str:
-    """Return an action's name for people: with the names of the actions around it, each without its
-    number if no other action of its level has that name."""
+    """Return the name of an action for people, such as "Search › Pick 1": first the sub-graphs that
+    contain the action, from the outermost, then the action. `full_name`: name, "_" and number. The
+    number is left out where only one action of its level has the name."""
     found = places_of(run)
     place = found.get(full_name)
     if place is None:

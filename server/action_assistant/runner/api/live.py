@@ -476,7 +476,8 @@ class Outbox:
                 await self._news.wait()
 
     def look(self) -> Unseen | None:
-        """Look now at what the person may see; return what they may not."""
+        """Read the rights of the person anew, and return the graphs that they may not see now; None
+        if they see everything."""
         self._look_at = anyio.current_time() + _LOOK_S
         self._unseen = self._hub.unseen(self.identity)
         self._hidden.clear()

@@ -567,8 +567,8 @@ async def _umrf(services: RunnerServices, text: str) -> Response[bytes]:
 
 
 def canonical(text: str) -> bytes:
-    """Return the graph of a UMRF text in the form that imports read, in UTF-8. Call it in a worker
-    process. Raise NotFound if the text cannot be read."""
+    """Return the graph of a UMRF text as canonical UMRF in UTF-8, which the editor can import. Call
+    this in a worker process. Raise NotFound if the text is no UMRF graph."""
     try:
         graph = codec.read(text).graph
     except codec.Unreadable as wrong:

@@ -265,7 +265,7 @@ def _unfinished() -> Select[Any]:
 
 def _place(row: Row[Any], run_id: str) -> str:
     """Return the path, in the folder of archives, of the file for the events of a run, or of a
-    piece of it (`run_id`). `row`: of the run."""
+    piece of it (`run_id`). `row`: the row of the run."""
     ended: datetime = views.time(row.ended_at)
     return f"runs/{ended:%Y-%m}/run-{row.number:06d}-{run_id}.jsonl.gz"
 

@@ -342,8 +342,8 @@ class EmulatedEngine:
         return () if self.gone else tuple(self._engine.executing(self._awake_ms))
 
     def hear(self, message: Message, at_ms: float) -> None:
-        """Receive a command at `at_ms`. It may have to wait, and is dropped if too many newer
-        commands of its topic come."""
+        """Receive a command at `at_ms` (ms on the clock of the emulator). The command may wait in
+        the queue of its topic, and is dropped if too many newer commands of that topic come."""
         self._pass(at_ms)
         if isinstance(message, Start) and self.quirks.late_ms:
             self._later(self.quirks.late_ms, partial(self._arrive, message))

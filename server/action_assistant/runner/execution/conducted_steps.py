@@ -401,11 +401,11 @@ def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
 
 
 def seen_inside(step: Step, whole: str, at: int) -> list[PieceSeen]:
-    """Return an event for each action inside the sub-graph of a step that has changed since the
-    last call, and remember that it was returned. `whole`: the name of the graph of the led
-    run, used in the names of these actions as in a run on one robot; `at`: µs UTC. One call may
-    visit an inner action several times: the number of its visit is in the low bits of the number of
-    the call."""
+    """Return an event for each action inside the sub-graph of a step whose state has changed since
+    this function was last called for the step. `whole`: the name of the graph of the led run, with
+    which the names of these actions begin; `at`: the time of the events in µs UTC. The step may
+    visit an inner action several times: `call` of an event is the number of the step's call,
+    shifted left by 20 bits, plus the number of the visit."""
     run = step.run
     if run is None:
         return []
@@ -491,9 +491,9 @@ class RestNews:
         self._told: dict[str, PieceRest] = {}  # by piece
 
     def show(self, piece: Run, *, asks: bool = False) -> None:
-        """Report how far it is proven that a piece is at rest, if that has changed since the last
-        report. `asks`: the piece has ended without an outcome, and a person is asked for it until
-        the piece moves again."""
+        """Report whether it is proven that a piece is at rest, and by what, if this has changed
+        since the last report. `asks`: the piece has ended without an outcome, and a person is asked
+        for the outcome. Later calls report that question too, until the piece moves again."""
         known = self._told.get(piece.id)
         asks = asks or (piece.end is not None and known is not None and known.asks)
         now = rest_of(piece, self._clock_us(), asks=asks)

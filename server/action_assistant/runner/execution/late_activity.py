@@ -89,8 +89,8 @@ class LateActivity:
         return bool(self._others.get(run) or self._elsewhere.get((robot, run)))
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Process the graphs (`snapshots`) that an engine shows in an answer or by feedback: those
-        of ended runs that move are queued for `run`. Return at once."""
+        """Check the graphs (`snapshots`) that an engine reports in an answer or by feedback. If a
+        graph moves although its run has ended, queue it for the method `run`. Do not wait."""
         robot = engine.registration.name
         for each in snapshots:
             if each.run is None or not each.active or (robot, each.run) in self._looking:

@@ -104,7 +104,7 @@ class LedGate(Gate):
 
     def wait_for_person(self, by: Author, reason: str, request_id: str) -> None:
         """Hold the run before its next action, since a person wants that; do nothing if it is held.
-        `reason`: given by the person, may be ""; `request_id`: of the press."""
+        `reason`: given by the person, may be ""; `request_id`: the request id of the press."""
         why = f"{by.name} made it wait: {reason}" if reason else f"{by.name} made it wait."
         now = self._clock_us()
         held = Held(at=now, why=why, by=by, how="wait", reason=reason, request_id=request_id)
@@ -192,8 +192,8 @@ class LedGate(Gate):
                 self.hold_run(why, how="breakpoint", node=step.node)
 
     def set_breakpoints(self, author: Author, breakpoints: tuple[Breakpoint, ...]) -> None:
-        """Let the run wait at these breakpoints from now on, and record that. A run that waits at one
-        that is there no more waits still."""
+        """Let the run wait at these breakpoints from now on, and record that. A run that already
+        waits at a breakpoint goes on waiting, even if that breakpoint is no longer among these."""
         self.breakpoints = breakpoints
         event = BreakpointsSet(at=self._clock_us(), author=author, breakpoints=breakpoints)
         self._tell(event, author.id)
@@ -205,8 +205,10 @@ class LedGate(Gate):
             self.hold_run("One step was made.", self._let_by, how="step", node=step.node)
 
     def _next(self, limit: StepLimit) -> Step | None:
-        """Return the only step that may pass by this limit; None if there is no such limit. Raise
-        BadInput for a name that no action has, Conflict if nothing waits, or not the named action, or the one before which to wait waits."""
+        """Return the only step that this limit lets pass; None if the limit lets several pass.
+        Raise BadInput for a name that no action has. Raise Conflict if the step that should pass
+        does not wait, or if the action before which the run should wait is already waiting to
+        begin."""
         for path, name in (("/action", limit.action), ("/until", limit.until)):
             if name and name not in self._first.actions:
                 raise BadInput(f"{name} is no action of this run.", where={"path": path})
@@ -224,13 +226,14 @@ class LedGate(Gate):
         raise Conflict(f"No step was made. {what}", where={"path": "/action"})
 
     def why_not_allowed(self, robot: str) -> str:
-        """Return why the person for whom the run is led may begin nothing on a robot now; "" if they
-        may."""
+        """Return the reason why the person for whom the run is led may begin nothing on a robot
+        now; "" if they may."""
         return self._look.why_not_allowed(robot, self.person, self.claim)
 
     def hold_to_limits(self, step: Step, text: PieceText) -> None:
-        """Hold and stop the run, and raise NotSent, if a value of a piece is outside a limit of its robot
-        now. `text`: of the piece."""
+        """Check the values of the piece that is sent for `step` against the present limits of its
+        robot. If one is outside, hold the run, raise an alarm, stop the run and raise NotSent.
+        `text`: the text of the piece."""
         over = text.over(self._look.limits_of(step.engine), step.call.inputs)
         if over is not None:
             why = over.sentence(step.engine)

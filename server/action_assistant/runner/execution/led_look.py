@@ -51,8 +51,9 @@ class Cleared(msgspec.Struct, frozen=True):
     at: float
 
     def require_still(self) -> None:
-        """Check again, without waiting, right before a piece leaves. Raise NotSent if the engine
-        was restarted or became doubtful, or if the answer is too old."""
+        """Check once more, right before a piece is sent, that the piece may begin; do not wait.
+        Raise NotSent if the engine was restarted since its answer, if its state is in doubt, or if
+        its answer is more than 3 s old."""
         standing = self.robot.standing
         if standing.incarnation not in {"", self.life} or standing.doubt:
             raise NotSent("its robot has changed before it left")
@@ -85,10 +86,10 @@ class LedLook:
         claim: Claim,
         cleared: str = "",
     ) -> list[Item]:
-        """Return an item of each rule for a robot that has just given this answer. `lead`: for whom the
-        run is led; `claim`: of its start; `cleared`: the life of its engine that was looked at before
-        the start, "" before that, when `lead` reads the items. Raise Unavailable if the journal cannot
-        be read."""
+        """Return an item of each rule for a robot that has just given this answer. `lead`: the
+        person for whom the run is led; `claim`: the claim of its start; `cleared`: the life of its
+        engine that was looked at before the start, "" before that, when `lead` reads the items.
+        Raise Unavailable if the journal cannot be read."""
         indexing = await self._indexing_item(robot, answer.incarnation, cleared)
         name = robot.registration.name
         rights = self._rights.items(name, lead, claim, is_asking=not cleared)
@@ -102,8 +103,8 @@ class LedLook:
         self, robot: str, lead: Identity | None, claim: Claim, *, is_decided: bool = False
     ) -> str:
         """Return why a run that is led for `lead` may begin nothing on a robot now; "" if it may.
-        None: nobody has let it go on since the runner's restart. `claim`: of the run; `is_decided`: a
-        change counts before it is stored."""
+        `lead` is None if nobody has let it go on since the runner's restart. `claim`: the claim of
+        the run; `is_decided`: a change counts before it is stored."""
         if lead is None:
             return _NOBODY
         refused = self._rights.refusals(robot, lead, claim, is_asking=False, is_decided=is_decided)
@@ -120,8 +121,8 @@ class LedLook:
         self, robot: KnownEngine, run: Requested, lead: Identity | None, claim: Claim
     ) -> Cleared:
         """Ask a robot, wait for its answer, and return the proof that a piece of a led run may
-        begin on it. `claim`: of the run. Raise NoAnswer with the reason if the robot does not answer, and also if its
-        answer or a check forbids a piece."""
+        begin on it. `claim`: the claim of the run. Raise NoAnswer with the reason if the robot does
+        not answer, and also if its answer or a check forbids a piece."""
         assert run.led is not None
         name = robot.registration.name
         if lead is None:
@@ -183,8 +184,9 @@ class LedLook:
         claim: Claim,
     ) -> None:
         """Check the robots with these names at the same time, before a held run goes on, and wait
-        for their answers. `run`: its first event; `lead`: the person who lets it go on; `claim`: of the
-        run from then on. Raise Conflict with the reasons of all robots on which no piece may begin."""
+        for their answers. `run`: its first event; `lead`: the person who lets it go on; `claim`:
+        the claim of the run from then on. Raise Conflict with the reasons of all robots on which no
+        piece may begin."""
         found: dict[str, str] = {}
 
         async def look(name: str) -> None:

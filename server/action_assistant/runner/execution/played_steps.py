@@ -80,8 +80,9 @@ class PlayedSteps:
             del self._shown[step.node]
 
     def shows(self, change: Exact) -> bool:
-        """Return whether people are shown a change that the engine reports: not if it is one of an
-        action of the simulator that has not begun. Call this for each change, in order."""
+        """Return whether people are shown a change that the engine reports. False for a change of
+        an action that the simulator plays, while that action has not begun. Call this for each
+        change, in order."""
         if not isinstance(change, NodeState | NodeResult) or change.graph != self._graph:
             return True
         if change.node not in self._nodes:

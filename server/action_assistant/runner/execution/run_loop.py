@@ -195,9 +195,11 @@ class OpenRun:
         limits: Limits = NO_LIMITS,
     ) -> None:
         """Record that `author` gave the run another graph, and send it (`order`) to the engine.
-        `version` and `digest`: of the new graph; `continue_from`: the full name of an action to
-        start then, "" for none; `watching`: the robots that they watch; `limits`: in force on the robot. Raise NotSent if it could not be sent, EngineRefused if the engine
-        refuses it, and OutcomeUnknown if it cannot be known whether the engine runs it."""
+        `version` and `digest`: the version and digest of the new graph; `continue_from`: the full
+        name of an action to start then, "" for none; `watching`: the robots that they watch;
+        `limits`: the limits in force on the robot. Raise NotSent if it could not be sent,
+        EngineRefused if the engine refuses it, and OutcomeUnknown if it cannot be known whether the
+        engine runs it."""
         asked = ModifyRequested(
             at=self._clock_us(),
             author=author,

@@ -190,10 +190,12 @@ class ExecutionService:
         sources: StartSources = NO_SOURCES,
         identity_now: IdentityNow = unchanged,
     ) -> "AsyncIterator[ExecutionService]":
-        """Return a context with the service, which has taken over the runs that an earlier process
-        left open. `past` reads runs that are over; `simulator` makes links to simulated engines;
-        `sources` are the behaviours, expected courses and index folders that starts need;
-        `identity_now` says whether a person was ended, and which role and groups they have now."""
+        """Return a context manager that yields the service after it has taken over the runs that an
+        earlier process left open; at its end the background tasks are cancelled. `past` reads runs
+        that are over; `simulator` makes links to simulated engines; `sources` are the behaviours,
+        expected courses and index folders that starts need; `identity_now` returns an identity with
+        the role and groups that its person has now, or None if the access of the person was
+        ended."""
         async with anyio.create_task_group() as tasks:
             runtime = Runtime(journal, clock_us, BackgroundTasks(tasks), run_in_worker)
             control = cls(
@@ -289,10 +291,10 @@ class ExecutionService:
         identity: Identity | None = None,
         repeat: PartOfRepeat | None = None,
     ) -> Started:
-        """Carry out a start, at most once per request id. Return after the one start message was sent.
-        `identity`: that of the author; None for an operator without groups; `repeat`: of which the run
-        is a cell. Raise a subclass of Refused
-        if the start is refused; nothing was sent then."""
+        """Carry out a start, at most once per request id. Return after the one start message was
+        sent. `identity`: the identity of the author; None for an operator without groups; `repeat`:
+        the repeat of which the run is a cell. Raise a subclass of Refused if the start is refused;
+        nothing was sent then."""
         starter = identity or operator_of(author)
         self.rights.act(starter)
         return await self._starts.start(request, author, starter, repeat)

@@ -89,8 +89,8 @@ class StartPipeline:
         repeat: PartOfRepeat | None = None,
     ) -> Started:
         """Carry out a start of `starter`, at most once per request id. Return after the one start
-        message has left. `repeat`: of which the run is a cell. Raise a subclass of Refused if the start is
-        refused; nothing was sent then."""
+        message has left. `repeat`: the repeat of which the run is a cell. Raise a subclass of
+        Refused if the start is refused; nothing was sent then."""
         stops = self._stops.count
         async with self._claims.once(request.request_id):
             known = await self._known(request)
@@ -231,7 +231,7 @@ def _to_store(
     accepted: AcceptedStart, author: Author, *, at: int, number: int, group: str | None
 ) -> tuple[Requested, Order]:
     """Return the event that stores a start, and the order that is handed to the link. `at`: µs UTC;
-    `number`: of the new run; `group`: the id of its group, or None."""
+    `number`: the number of the new run; `group`: the id of its group, or None."""
     request, ready, begins = accepted.request, accepted.prepared, accepted.prepared.beginning
     requested = Requested(
         at=at,

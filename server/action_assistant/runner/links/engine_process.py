@@ -63,10 +63,10 @@ def has_ended(known: EngineProcess) -> bool:
 def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProcess | None:
     """Return the process behind a DDS participant (`prefix`: its GUID prefix in hex) if it
     certainly runs on this computer, else None. `ours`: the GUID prefix of this process; `domain`:
-    of ROS; `name`: of the engine. Fast DDS puts two bytes of the host and the low two bytes of the
-    process id into the prefix. Containers on one network share the host bytes and have process ids
-    of their own, so the process must also hold a port of that domain and have the engine's name in
-    its command line. For every other middleware the result is None."""
+    the ROS domain; `name`: the name of the engine. Fast DDS puts two bytes of the host and the low
+    two bytes of the process id into the prefix. Containers on one network share the host bytes and
+    have process ids of their own, so the process must also hold a port of that domain and have the
+    engine's name in its command line. For every other middleware the result is None."""
     if len(prefix) < 24 or prefix[:8] != ours[:8] or not prefix.startswith(_FAST_DDS):
         return None
     low = int.from_bytes(bytes.fromhex(prefix[8:12]), "little")

@@ -20,7 +20,8 @@ class Listeners(Generic[_News]):
 
     @contextmanager
     def listening(self, hear: Callable[[_News], None]) -> Iterator[None]:
-        """Return a context during which `hear` is called with all news."""
+        """Return a context manager; inside of its block `hear` is called with each piece of
+        news."""
         self._all.append(hear)
         try:
             yield

@@ -181,8 +181,9 @@ def follow(repeat: Repeat | None, event: RepeatEvent) -> Repeat | None:
 
 
 def replay(events: Iterable[tuple[str, bytes]]) -> Repeat | None:
-    """Fold the events of a repeat, each as its kind and body; None without its first one. Events of kinds
-    that this version does not know are skipped. Raise msgspec.DecodeError for a damaged body."""
+    """Return a repeat, folded from its events, each given as its kind and body; None if the event
+    that opened the repeat is missing. Events of kinds that this version does not know are skipped.
+    Raise msgspec.DecodeError for a damaged body."""
     found: Repeat | None = None
     for kind, body in events:
         known = _KINDS.get(kind)

@@ -551,8 +551,8 @@ class Repeats:
         return self._records[id_]
 
     async def _close_left(self) -> None:
-        """Store that the repeats are closed which an earlier process left open. None of them goes on,
-        also where that cannot be stored."""
+        """Close the repeats that an earlier process left open, and store that. None of them goes
+        on, even if this cannot be stored."""
         newest: dict[str, str] = {}
         for row in await self._journal.query(queries.kinds_of_repeats(StartKept.kind)):
             newest.setdefault(row.stream, row.kind)

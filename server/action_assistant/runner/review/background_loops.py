@@ -57,7 +57,7 @@ class SumUpLoop:
 
     def run_changed(self, run: Run, recorder: RunRecorder) -> None:
         """Call this when an open run has changed: if it has ended, its totals are computed soon.
-        `recorder`: of the run."""
+        `recorder`: the recorder of the run."""
         if run.end is not None:
             if not recorder.recorded:
                 self._summed_up = None  # its end may be stored much later
@@ -139,7 +139,7 @@ class KeyframeLoop:
 
     def run_changed(self, run: Run, recorder: RunRecorder) -> None:
         """Call this when an open run has changed: if it has grown enough, its keyframes are stored
-        soon. `recorder`: of the run."""
+        soon. `recorder`: the recorder of the run."""
         count = recorder.seq // APART
         if run.end is not None:  # its sum makes its keyframes
             self._kept.pop(run.id, None)

@@ -52,7 +52,7 @@ class ReviewService:
 
     def run_changed(self, run: Run, recorder: RunRecorder) -> None:
         """Call this when an open run has changed, so that its totals and keyframes are stored when
-        due. `recorder`: of the run."""
+        due. `recorder`: the recorder of the run."""
         self._sums.run_changed(run, recorder)
         self._keyframes.run_changed(run, recorder)
 

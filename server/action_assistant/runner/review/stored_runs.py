@@ -87,7 +87,8 @@ async def numbers_with(
     text: str, rows: Callable[[Select[Any]], Awaitable[Sequence[Row[Any]]]]
 ) -> set[int] | None:
     """Return the numbers of all runs that may contain a text, by the index of words; None if there
-    may be too many, or if only reading all runs can answer. `rows`: runs a SELECT."""
+    may be too many, or if only reading all runs can answer. `rows`: executes a SELECT and returns
+    its rows."""
     pieces = word_index.pieces(text)
     late = await rows(word_index.unindexed()) if pieces else []
     for piece in pieces if len(late) <= word_index.MOST else []:
@@ -197,8 +198,8 @@ class StoredRuns:
     # --- one run ------------------------------------------------------------------------------
 
     async def causes(self, run_id: str) -> list[CauseShown]:
-        """Return the proven causes of a run's end, the weightiest first. Raise NotFound if there is
-        no such run."""
+        """Return the proven causes of a run's end, the most important one first. Raise NotFound if
+        there is no such run."""
         found, graph = await self.known(run_id), await self._graph(run_id)
         shown: list[CauseShown] = []
         for each in causes(found, graph)[:_CAUSES]:

@@ -78,7 +78,7 @@ class Robots:
         shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None],
     ) -> None:
         """Start to watch the robots of `links`, and from now on every robot that is added. The
-        functions are called with what robots report, as those of `EngineListeners`."""
+        functions are called with what robots report, like the fields of `EngineListeners`."""
         self._opened = (
             runtime,
             EngineListeners(

@@ -49,8 +49,8 @@ def visit_counts(run: Run) -> dict[str, VisitCount]:
 
 
 def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
-    """Return whether every visit of this action was seen for certain. `name`: of the action in the
-    run, with a "/" inside of a sub-graph."""
+    """Return whether every visit of this action was seen for certain. `name`: the name of the
+    action in the run, with a "/" inside of a sub-graph."""
     if "/" in name and run.led is not None:
         return False  # a robot shows what is inside of a piece, and may miss visits
     if action.by == "" and action.visits:

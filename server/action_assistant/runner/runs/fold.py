@@ -599,9 +599,9 @@ def _looked_at(run: Run, looked: int) -> Run:
 
 
 def _timed(run: Run, at: int, asked: int | None) -> Run:
-    """Return the run with the time since when it is over, or was last seen going on. `at`: of the
-    observation; `asked`: when its answer was requested, None for other observations (µs UTC). All
-    actions are examined only if the graph's state is final."""
+    """Return the run with the time since when it is over, or was last seen going on. `at`: the time
+    of the observation; `asked`: when its answer was requested, None for other observations (µs
+    UTC). All actions are examined only if the graph's state is final."""
     if run.graph_state in TERMINAL and run.apparent_end is not None:
         return run if run.over_at is not None else replace(run, over_at=at)
     if run.over_at is None and (asked is None or asked <= run.going_at):

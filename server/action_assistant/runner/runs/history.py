@@ -64,8 +64,8 @@ class RunHistory:
 
     async def left(self, run: str) -> tuple[Run | None, int, bool]:
         """Return a run that an earlier process left open, the number (seq) of its last event, and
-        whether all events could be read. Damaged events are skipped; the run is None without its
-        first event."""
+        whether all events could be read. Damaged events are skipped; the run is None if its first
+        event is missing."""
         events = await self._journal.read(stream_of(run))
         read = [_decoded(each) for each in events]
         events_read = [event for event in read if event is not None]

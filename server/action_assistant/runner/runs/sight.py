@@ -227,10 +227,11 @@ class RunSight:
     async def accept(
         self, sight: Sight | None, version: str, digests: tuple[str | None, ...], identity: Identity
     ) -> None:
-        """Verify the sight that came with a version, and remember its rules. `digests`: those of the
-        version that was sent. Raise BadInput for a wrong seal, Conflict for the sight of another
-        version, Forbidden if the identity may not see one of its graphs, Unavailable if the rules
-        cannot be stored."""
+        """Verify the sight (the sealed rules of a version's graphs) that came with the version, and
+        remember its rules. Do nothing if `sight` is None. `digests`: the digests of the version
+        that was sent; the sight must name one of them. Raise BadInput for a wrong seal, Conflict
+        for the sight of another version, Forbidden if the identity may not see one of the graphs,
+        Unavailable if the rules cannot be stored."""
         if sight is None:
             return
         where: dict[str, object] = {"path": "/sight"}
@@ -253,8 +254,9 @@ class RunSight:
         return learned.at > self._clock_us() + _SKEW_US
 
     async def _learn(self, sight: Sight) -> None:
-        """Remember the rules of a sight that are newer than what is known, also where they are the same:
-        an older sight that is sent again later must not replace them."""
+        """Remember the rules of a sight that are newer than the known ones. Equal rules are
+        remembered with the newer time, so that an older sight that is sent again later does not
+        replace them."""
         counting = self._counting()
         newest = None if self._rules is None else self._rules.newest()
         since = 0 if newest is None else newest.at

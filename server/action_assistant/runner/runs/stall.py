@@ -321,7 +321,7 @@ class _Stalled:
 
 
 def in_words(wait: Wait) -> str:
-    """Return the sentence for a reason to wait."""
+    """Return a sentence that says for what an action, or the end of the graph, waits."""
     who = wait.action if wait.action is not None else "The end of the graph"
     match wait:
         case ForParent(parent=parent, begun=True):

@@ -409,8 +409,8 @@ def prepared(
     limits: Limits = NO_LIMITS,
 ) -> Prepared:
     """Admit a start and write the text that will be sent as this run. For workers: it takes long
-    with large graphs. Raises what `admit` raises. `earlier`: as of `admit`; `limits`: in force on the
-    robot that gets all of it."""
+    with large graphs. Raises what `admit` raises. `earlier`: as for `admit`; `limits`: the limits
+    in force on the robot that gets the whole graph."""
     admitted = admit(request, facts, approved=approved, earlier=earlier)
     graph = admitted.graph
     inside = [action for each in admitted.inside.values() for action in each.actions]
@@ -573,8 +573,9 @@ def prepared_pieces(
     limits: Limits = NO_LIMITS,
 ) -> PreparedPieces:
     """Admit the start of a led run and write the texts of its pieces. For workers. Raises what
-    `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for a
-    graph that cannot run as pieces. `earlier`: as of `admit`; `limits`: in force on its robots."""
+    `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for
+    a graph that cannot run as pieces. `earlier`: as for `admit`; `limits`: the limits in force on
+    its robots."""
     whole = prepared(request, facts, run, approved=approved, earlier=earlier)
     whole = msgspec.structs.replace(whole, limits=limits)
     graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)

@@ -220,7 +220,7 @@ class Approvals:
         self, robot: Registration, digest: str, starter: str, what: str = "this graph"
     ) -> None:
         """Raise Conflict if the robot needs an approval of this graph, or order, and nobody but the
-        starter has given one. `what`: as of `item`."""
+        starter has given one. `what`: as for `item`."""
         item = await self.item(robot, digest, starter, what)
         if item is not None and item.verdict == "blocked":
             raise Conflict(item.text, where={"path": "/engine", "item": item.code})

@@ -34,9 +34,11 @@ def is_preset(action: Action, script: Script) -> bool:
 
 
 def people_of(graph: Graph, people: Mapping[str, str], *, is_part: bool) -> dict[str, str]:
-    """Return who answers the questions of a graph, by actor; empty if it asks nobody and never lets the
-    runner wait. Raise BadInput for an actor of which that is not said, or that the graph does not
-    have. `people`: as the request says; `is_part`: what is skipped asks nobody."""
+    """Return who answers the questions of each actor of a graph; "" stands for questions without an
+    actor. The result is empty if the graph neither asks people nor lets the runner wait. `people`:
+    who answers, by actor, in the request; `is_part`: only a part of the graph starts, so `people`
+    may name actors whose questions are skipped. Raise BadInput if `people` lacks an actor that
+    asks, or, without `is_part`, names one that does not ask."""
     roles = roles_in(graph) | {""} if any(map(is_asked, graph.actions)) else frozenset[str]()
     for role in sorted(roles):
         if role and role not in people:
@@ -49,8 +51,8 @@ def people_of(graph: Graph, people: Mapping[str, str], *, is_part: bool) -> dict
 
 
 def without_preset(graph: Graph, asked: dict[str, Asked], script: str) -> dict[str, Asked]:
-    """Return the actions of a graph that are asked where nothing moves: not those that the script
-    answers."""
+    """Return the actions `asked` without those that the script answers, since it does so where
+    nothing moves."""
     if not script:
         return asked
     known = script_from(msgspec.json.decode(script))

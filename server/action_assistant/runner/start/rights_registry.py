@@ -141,9 +141,9 @@ class RightsRegistry:
         is_asking: bool = True,
         is_decided: bool = False,
     ) -> tuple[Refusal, ...]:
-        """Return why an identity may not start on a robot now; empty if it may. `claim`: of the start,
-        None where no start is meant yet; `is_asking`: the sentences are for this person, else about
-        them; `is_decided`: a right that begins counts before it is stored."""
+        """Return why an identity may not start on a robot now; empty if it may. `claim`: the claim
+        of the start, None where no start is meant yet; `is_asking`: the sentences are for this
+        person, else about them; `is_decided`: a right that begins counts before it is stored."""
         record, now = self._record(robot), self._runtime.clock_us() / 1e6
         who = identity.person.name or "The starter"
         current = self.current(identity)
@@ -254,8 +254,8 @@ class RightsRegistry:
         raise refuse(" ".join(each.text for each in every), where=where)
 
     def require_still(self, robots: Iterable[str], identity: Identity, claim: Claim) -> None:
-        """Raise NotSent if an identity may not start on one of these robots any more: for the step in
-        which a message leaves."""
+        """Raise NotSent if an identity may not start on one of these robots any more. Call this in
+        the same step of the event loop in which the message is sent."""
         try:
             self.require(robots, identity, claim)
         except Refused as why:
@@ -265,7 +265,7 @@ class RightsRegistry:
         self, robot: str, identity: Identity, claim: Claim, *, is_asking: bool = True
     ) -> tuple[Item, ...]:
         """Return the items of a pre-flight: none for a robot without rules on which everybody with
-        the role may start. `claim`: of the start."""
+        the role may start. `claim`: the claim of the start."""
         refused = self.refusals(robot, identity, claim, is_asking=is_asking)
         found = [Item(code=each.code, verdict="blocked", text=each.text) for each in refused]
         rules, blocked = self.of(robot).rules, {each.code for each in refused}

@@ -38,9 +38,10 @@ class Beginning(msgspec.Struct, frozen=True, kw_only=True):
 def beginning(
     graph: Graph, tree: str, values: StartValues, start: StartFrom, before: EarlierRun | None
 ) -> Beginning:
-    """Return where a start begins. `graph`: of the version, `tree`: its tree digest; `values`: those
-    of the start; `before`: the earlier run, if it names one. Raise Conflict if that run was another
-    version, or had other values, BadInput if there is no such part."""
+    """Return where a start begins. `graph`: the graph of the version; `tree`: its tree digest;
+    `values`: the values of the start; `before`: the earlier run, if the start names one. Raise
+    Conflict if that run was another version, or had other values, BadInput if there is no such
+    part."""
     number = 0 if before is None else before.first.number
     if start.continues:
         if before is None:

@@ -65,9 +65,10 @@ class RestProof:
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """Process one more answer, requested at `asked` (seconds of the event loop). `shown`: the
-        snapshots of the graph, first, and its sub-graphs. Return whether nothing has moved for long
-        enough."""
+        """Process one more answer of the engine, requested at `asked` (seconds of the event loop).
+        `shown`: the snapshot of the graph, then the snapshots of its sub-graphs. Return whether the
+        answers so far prove that the graph is at rest, that is, for long enough without an active
+        action."""
         state = shown[0].state
         moving = any(each.active for each in shown)
         if moving or state not in TERMINAL | NEVER_BEGAN:

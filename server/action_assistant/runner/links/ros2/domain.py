@@ -269,8 +269,8 @@ class Domain:
 
     def _overhear(self, command: Command, kind: type[M], topic: str, ours: Outlet[M]) -> None:
         def heard(message: M, info: dict[str, int | None]) -> None:
-            """Report a command that another program has published. `info`: of the middleware, with
-            the time of sending."""
+            """Report a command that another program has published. `info`: what the
+            middleware says of the message, with the time of sending."""
             if ours.sent(message, info.get("source_timestamp")):
                 return
             graph, umrf = _named(message)
