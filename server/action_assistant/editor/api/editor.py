@@ -71,7 +71,7 @@ class Participant(msgspec.Struct, frozen=True):
 
 def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
     """Return the routes that belong to no single graph: settings, people, examples and the stream
-    of events. `addresses`: of this server for other people."""
+    of events. `addresses`: the addresses of this server for other people."""
 
     known = commit()
 

@@ -282,8 +282,8 @@ class ProviderSignIn:
         return session
 
     async def _put_out(self, person: str, found: ProviderIdentity) -> None:
-        """End the sessions of a person whom no group lets in any more, and let their tokens, and sessions
-        that nobody has noted, do nothing but Stop."""
+        """End the sessions of a person whose groups give no access any more. Restrict their tokens,
+        and sessions that nobody has noted, to Stop."""
         ended = await to_thread.run_sync(self._browsers.end_all_of, person)
         for session in ended.ids:
             self._audit.note(SessionEnded(session), person)

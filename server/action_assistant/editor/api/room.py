@@ -40,9 +40,10 @@ class RoomConnection:
         self._rate_limits = rate_limits
 
     def receive(self, data: bytes | None) -> float:
-        """Handle one binary message of the socket; None stands for a text message, which is
-        refused. Return for how many seconds the socket must not be read, in addition to the time
-        while it is far ahead of the room. Close the socket if the message is malformed."""
+        """Handle one binary message of the socket. Close the socket if the message is malformed, or
+        is a text message (None). Return for how many seconds the caller must not read the socket,
+        since its person has sent much. `pause` waits for this time, and also while too many edits
+        of the socket wait in the room."""
         member = self.member
         if data is None:
             member.refuse(messages.UNREADABLE)

@@ -92,8 +92,8 @@ class GraphFacts:
         return self._put(graph, facts)
 
     async def recall(self, graphs: Collection[str]) -> None:
-        """Bring what the table has about the graphs with these ids into memory. Raise Unavailable
-        if the journal cannot be read."""
+        """Load the stored facts about the graphs with these ids into memory, except where memory
+        has facts about a graph already. Raise Unavailable if the journal cannot be read."""
         missing = [graph for graph in graphs if self._known.get(graph) is None]
         for start in range(0, len(missing), _ROWS):
             some = missing[start : start + _ROWS]

@@ -232,8 +232,10 @@ class GraphRights:
                 )
 
     async def check(self, kind: Kind, thing: str, identity: Identity, *, edits: bool) -> None:
-        """Raise NotFound if a thing does not exist or lies out of the sight of an identity, in the
-        words; raise Forbidden if `edits` is True and it may only be seen."""
+        """Raise NotFound if the thing with this id does not exist, or, with the same message, if
+        the identity may not see it. Raise Forbidden if `edits` is True and the identity may see but
+        not edit the thing. Do nothing while there are no rules. Raise Unavailable if the
+        journal cannot be read."""
         await self._require_current()
         if not self._is_ruled:
             return  # the route says by itself what does not exist

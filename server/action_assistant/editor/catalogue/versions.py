@@ -187,8 +187,9 @@ class Versions:
         return _view(row)
 
     async def withdraw(self, version: str, author: PersonRef) -> VersionView:
-        """Withdraw the release of a version: from then on no robot that demands one takes it. Raise
-        NotFound if there is none with this id, Unavailable if that cannot be stored."""
+        """Withdraw the release of the version with this id, so that it no longer starts on robots
+        that demand a release. Return the version; one that was not released stays as it is. Raise
+        NotFound if there is no such version, Unavailable if the withdrawal cannot be stored."""
         async with self._releasing:
             row = await self._row(version)
             await anyio.to_thread.run_sync(self._released.remove, version)

@@ -40,7 +40,7 @@ def _most_bytes() -> int:
 
 def refuse_too_much(graph: Graph, dialect: str) -> None:
     """Raise TooLarge, with the place in the file, if a graph has more actions or arrows than a
-    document may have. `dialect`: of the file."""
+    document may have. `dialect`: the dialect of the file."""
     actions = "/umrf_actions" if dialect in {"D1", "D1'"} else "/actions"
     real = [action for action in graph.actions if not action.missing]
     if len(graph.actions) > (most := _most_actions()):

@@ -349,8 +349,8 @@ def fill(doc: Doc, graph: Graph) -> None:  # type: ignore[type-arg]
 
 
 def change(doc: Doc, target: Mapping[str, Mapping[str, object]]) -> None:  # type: ignore[type-arg]
-    """Edit the document, in one transaction, until its root maps equal `target`. Keys whose values
-    are equal already are not touched."""
+    """Make the root maps of the document equal to `target`, in one transaction. Keys that `target`
+    does not have are deleted; keys that have the wanted value already are not touched."""
     with doc.transaction():
         now = maps_of(doc)
         for root in ROOTS:

@@ -102,8 +102,8 @@ def response(value: object) -> Response | None:
 
 
 def json_text(value: object) -> str | None:
-    """Return a value as unparsed JSON text. Return None if the value is no JSON text, or is nested
-    deeper than 64 levels."""
+    """Return the value unchanged if it is a string of valid JSON, nested at most 64 levels deep;
+    None for any other value."""
     if not isinstance(value, str):
         return None
     try:

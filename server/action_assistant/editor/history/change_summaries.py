@@ -69,8 +69,10 @@ def told(
     stretches: Sequence[Stretch],
     lost: Sequence[OverwrittenValue] = (),
 ) -> list[Changes]:
-    """Return the changes of each stretch. `changes`: in order of time; `base`: the values of the
-    touched keys before them; `lost`: the values that were overwritten at once, in order of time."""
+    """Return, for each stretch (a range of changes by one person), the difference that it made to
+    the graph. `base`: the newest change of each touched key before `changes`; `lost`: values that
+    lost against a concurrent edit, so that the graph never had them. `changes` and `lost` are in
+    order of time."""
     state = state_of(base)
     gone: State = {}  # the names of actions that were deleted
     wanted: list[dict[Place, OverwrittenValue]] = [{} for _ in stretches]

@@ -115,8 +115,9 @@ def followed(
 
 
 def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]:
-    """Return pairs of neighbouring states between which the course changes, and whether they are
-    certainly all: not if `budget_s` seconds of processor time were over before."""
+    """Return pairs of neighbouring states between which the course changes, and whether these
+    are certainly all pairs. They may not be if there are more than 200 states, or if the search
+    took more than `budget_s` seconds of processor time."""
     last = len(past.moments)
     parts = last if last <= _EACH else _SAMPLES
     marks = sorted({last * n // parts for n in range(parts + 1)})

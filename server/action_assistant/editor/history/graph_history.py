@@ -194,8 +194,9 @@ def without_hidden(entries: bytes, sees: Callable[[str], bool]) -> bytes:
 def history_of(
     connection: Connection, graph: str, limit: int, before: int | None
 ) -> list[HistoryEntry]:
-    """Return the newest entries of a graph's history, newest first, at most `limit`. With `before`,
-    the number of a change of the document, return only entries from before that change."""
+    """Return the newest entries of a graph's history, newest first, at most `limit`. `before`: the
+    number of a change of the graph; only entries older than that change are returned; None for
+    the newest ones."""
     person = stored_people(connection)
     versions = versions_by_event(connection, graph)
     special = _special(connection, graph, person)

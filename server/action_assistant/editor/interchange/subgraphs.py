@@ -92,8 +92,9 @@ def extraction_look(sight: GraphAtSeq, chosen: ChosenActions) -> bytes:
 
 
 def subgraph_file(sight: GraphAtSeq, chosen: ChosenActions) -> SubGraphFile:
-    """Return the new sub-graph for chosen actions of a graph at a change (`sight`), and the changes
-    for it. Raise Conflict if it is impossible, or may behave differently without `otherwise`."""
+    """Return the sub-graph that is made of chosen actions, and the changes of the outer document
+    that replace these actions by it. `sight`: the outer graph at one change. Raise Conflict if this
+    is impossible, or if the graph might then behave differently and `chosen.otherwise` is False."""
     found = _extraction(sight, chosen)
     look = _look(sight, found, chosen)
     for reason in look.reasons:

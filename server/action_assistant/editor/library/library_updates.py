@@ -136,7 +136,7 @@ def updating(sight: GraphAtSeq, graph: GraphAtSeq, renames: Renames) -> bytes:
 
 def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
     """Return the update of a library document (`sight`) that gives its action the parameters of a
-    use in `graph`: of the use with the key `aid`, or, for None, of the first use that differs.
+    use in `graph`: the use with the key `aid`, or, for None, the first use that differs.
     Values in the library stay. Raise NotFound if the graph has no such use."""
     action = _action_of(sight)
     found = [

@@ -36,7 +36,7 @@ def due(event: Event) -> Sequence[Executable]:
 
 
 def read(event: Event) -> Sequence[Executable]:
-    """Return the statements by which mentions count as read."""
+    """Return the SQL statements that store which mentions the author of the event has read."""
     keys = set(msgspec.json.decode(event.body, type=InboxRead).keys)
     c = mention_read.c
     mine = delete(mention_read).where(c.person == event.author, c.key.in_(keys))

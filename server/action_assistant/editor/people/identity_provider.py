@@ -103,8 +103,9 @@ class IdentityProvider:
         self._failed: tuple[str, float] | None = None
 
     async def metadata(self) -> Metadata:
-        """Return the description that the provider gives of itself. Raise Unavailable, with the
-        reason, if it cannot be had or used."""
+        """Return the description that the provider gives of itself (OpenID Connect discovery), from
+        a cache while it is fresh. Raise Unavailable, with the reason, if it cannot be fetched or
+        used."""
         kept = self._metadata
         if kept is not None and self._clock() < kept.until:
             return kept.value

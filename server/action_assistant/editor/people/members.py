@@ -363,8 +363,8 @@ class Members:
             await asyncio.to_thread(_try, self._write_groups)
 
     async def look(self, proof: str) -> Invited | None:
-        """Return the role and the name that a personal link gives; None if it is none. Raise
-        Unauthenticated or Withdrawn if it opens nothing any more."""
+        """Return the role and the name that a personal link gives; None if `proof` is not that of a
+        personal link. Raise Unauthenticated or Withdrawn if the link is no longer valid."""
         link, _, secret = proof.partition(".")
         expected = self._keys.secret_of(link)
         if not hmac.compare_digest(secret.encode(errors="replace"), expected.encode()):

@@ -69,9 +69,10 @@ async def provided(
 
 
 async def refused(members: Members, issuer: str, subject: str) -> None:
-    """Let a person whom no group of their provider lets in any more do nothing but Stop, with all
-    sessions and tokens, until a sign-in lets them in or an owner gives another last day. Raise
-    Unavailable if that cannot be stored."""
+    """Restrict a person to Stop, in all sessions and with all tokens, since none of their groups at
+    the provider gives access any more. The restriction lasts until the provider admits them at a
+    sign-in, or an owner sets another last day. Do nothing if the person is unknown or already
+    restricted. Raise Unavailable if the restriction cannot be stored."""
     person = provided_id(issuer, subject)
     async with members.turn:
         known, before = members.known(person)

@@ -149,8 +149,9 @@ class Comparisons:
         self._task: asyncio.Task[None] | None = None
 
     def ask(self, compare: ComparisonRequest) -> None:
-        """Queue an answer to a client with the fingerprint of the document. If the document has
-        changed since the client's own fingerprint, do nothing."""
+        """Have the fingerprint of the document computed in the background, and sent to a client. No
+        answer is sent if the document gets, or already has, a change after the one
+        (`compare.shown.seq`) at which the client made its own fingerprint."""
         if compare.shown.seq != self._room.seq:
             return
         self._waiting.append(compare)

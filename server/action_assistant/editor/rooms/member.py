@@ -37,12 +37,13 @@ class ByteRateLimits:
         self._presence_bytes: Final = per_minute // (60 * _MOVES)
 
     def spend_on_presence(self, person: str, size: int) -> float:
-        """Count a presence message of `size` bytes that a person sent, as some bytes at least;
-        return the seconds to wait before more of theirs is read."""
+        """Count a presence message of `size` bytes that a person sent; a short one counts as a
+        longer one. Return for how many seconds no more data of this person may be read."""
         return self.spend(person, max(size, self._presence_bytes))
 
     def spend(self, person: str, size: int) -> float:
-        """Count `size` bytes that a person sent; return the seconds to wait before more of theirs is read."""
+        """Count `size` bytes that a person sent. Return for how many seconds no more data of this
+        person may be read; 0 within the limit."""
         if not self._limits:
             return 0.0
         bucket = self._buckets.of(person)
@@ -134,8 +135,9 @@ class Member:
         return True
 
     def begins_sync(self) -> bool:
-        """Record that the socket asks for the document. Return False while an earlier answer is
-        still on its way: changes are sent after it, so a second answer would have nothing new."""
+        """Record that the socket asks for the document, and return True. Return False while an
+        earlier answer is still on its way: later changes are sent after that answer, so a second
+        answer would have nothing new."""
         if self._answer is not _SyncState.NONE:
             return False
         self._answer = _SyncState.WANTED
@@ -167,7 +169,8 @@ class Member:
             self.on_news()
 
     def post_ack(self, seq: int) -> None:
-        """Acknowledge the edits handled so far, and that everything up to `seq` was sent. Only the newest
+        """Queue an acknowledgement for the client: how many of its edits are handled, and that all
+        changes of the document up to the number `seq` were sent to it. Only the newest
         acknowledgement waits in the queue."""
         if self.acks and self.synced:
             says = self.handled, seq

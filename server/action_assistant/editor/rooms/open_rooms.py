@@ -130,7 +130,7 @@ class Rooms:
         return stream in self._deleted
 
     async def close(self) -> None:
-        """Finish the work of every room, and unload all."""
+        """Wait until every room has finished its work, and unload all rooms."""
         self._closed = True
         self._heartbeat.cancel()
         for timer in self._timers.values():

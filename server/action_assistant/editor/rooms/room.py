@@ -351,9 +351,9 @@ class Room:
         return await done
 
     async def read(self, see: Callable[[Replica, int], T]) -> T:
-        """Call `see(document, seq)` once all earlier edits are committed; return its result. `see`
-        must neither change the document nor keep it. Raise the errors of `see`; raise
-        Unavailable if the room is closed."""
+        """Call `see(document, seq)` once all earlier edits are committed, and return its result.
+        `seq`: the number of the newest change. `see` must neither change the document nor keep it.
+        Raise what `see` raises, or Unavailable if the room is closed."""
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[T] = self._loop.create_future()

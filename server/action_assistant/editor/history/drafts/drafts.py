@@ -202,7 +202,7 @@ class Drafts:
     async def _proposal(self, row: Row[Any]) -> tuple[DraftProposal | None, str]:
         """Return the open proposal of a draft (None if there is none), and the id of the browser it
         came from. Answers that earlier versions stored to one's own proposal or to unknown changes
-        do not count. `row`: of the draft."""
+        do not count. `row`: the row of the draft."""
         found: DraftProposal | None = None
         device = ""
         answers: dict[str, DraftAnswer] = {}
