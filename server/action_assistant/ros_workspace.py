@@ -142,8 +142,9 @@ def prefix_of(file: str) -> str:
 
 
 def source_of(build: Path) -> Path | None:
-    """Return the source folder of the package that colcon built in the folder `build`, read from
-    the cache of CMake; None if the cache cannot be read or does not name it."""
+    """Return the source folder of the package whose build folder (`build/PACKAGE` of a colcon
+    workspace) is `build`, read from the cache of CMake there; None if the cache cannot be read or
+    does not name the source folder."""
     try:
         with (build / "CMakeCache.txt").open("rb") as file:
             cache = file.read(_CACHE).decode(errors="replace")

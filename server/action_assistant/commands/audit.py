@@ -332,7 +332,7 @@ def _print_csv(rows: Iterable[AuditRow]) -> None:
 
 
 def csv_text(lines: Iterable[Iterable[object]]) -> str:
-    """Return CSV in which no cell is taken for a formula."""
+    """Return CSV in which a spreadsheet takes no cell for a formula."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     for line in lines:

@@ -89,8 +89,9 @@ def signing_key(path: Path, data: Path) -> Ed25519PrivateKey:
 
 
 def proving_key(path: Path, data: Path) -> Ed25519PublicKey:
-    """Read the public ed25519 key from the PEM file `path`, with a public or private key, outside
-    of the data folder. Raise CannotStart if the file is not such a key."""
+    """Return the public key that verifies the signature of a line, from the PEM file `path`, which
+    holds a public or a private ed25519 key. Raise CannotStart if the file cannot be read, holds no
+    such key, or lies in the data folder `data`."""
     text = _key_file(path, data)
     if b"PRIVATE KEY" in text:
         return signing_key(path, data).public_key()

@@ -36,9 +36,9 @@ class AfterProof(httpx.Auth):
         self._proven: dict[str, str] = {}
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
-        """Add the token to a request, after a challenge if the server was not proven yet. It is a
-        generator of requests, as httpx wants it. Raise CannotStart if the server does not prove
-        that it holds a token."""
+        """Yield a request with a token added, as httpx demands. Before the first request to a
+        server, yield a challenge, by which the server proves that it knows the token. Raise
+        CannotStart if it proves this for none of the tokens."""
         base = str(request.url).partition(_API)[0]
         if base not in self._proven:
             challenge = secrets.token_urlsafe(32)

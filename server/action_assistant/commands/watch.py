@@ -254,8 +254,8 @@ class WatchedGraph:
         return {"acks": "1"} | known
 
     def hear(self, message: bytes) -> None:
-        """Handle a message of the room. The document already has all earlier ones, since the
-        provider applies each before it reads the next."""
+        """Handle a message of the room. The document has all earlier messages and not yet this one:
+        the provider applies each message before it reads the next one."""
         reader = messages.ByteReader(message)
         match reader.number():
             case messages.SYNC:
@@ -338,9 +338,9 @@ class QuietSocket(HttpxWebsocket):
             self._end(error)
 
     async def recv(self) -> bytes:
-        """Return the next message of the room, after the watched graph has processed it. An error
-        is stored as the end of the connection before it is raised, since the provider that calls
-        this drops it."""
+        """Wait for the next message of the room, let the watched graph handle it, then return it to
+        the provider. If this fails, report the error as the end of the connection, and raise it:
+        the provider, which calls this method, ignores errors."""
         try:
             message: bytes = await super().recv()
             self._graph.hear(message)

@@ -56,8 +56,9 @@ class StoredColumns(NamedTuple):
 
 
 def linked(before: bytes, stream: str, events: StoredColumns) -> int:
-    """Return how many events of a stream, counted from the first, continue the chain of hashes that
-    ends at `before`. The result is that of `link` for each event, in half the time."""
+    """Return how many events of a stream, counted from the first, continue the chain of hashes
+    whose last link is `before`. This compares the stored chain of each event with the result of
+    `link`, but takes half the time."""
     told = {
         pair: _names(stream, *pair) for pair in set(zip(events.kinds, events.authors, strict=True))
     }

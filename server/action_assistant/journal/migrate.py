@@ -73,9 +73,9 @@ def upgrade_to(
 
 
 def kept_as_it_is(branch: Branch) -> Callable[[Connection], str]:
-    """Return a function that returns the revision of a database of a branch, of this version or an
-    earlier one, and changes nothing. It raises CannotStart as that of `upgrade_to` does, and for a
-    database without tables."""
+    """Return a function that returns the revision of a branch's database without changing it. The
+    revision may be older than this program's newest one. The function raises CannotStart for a
+    database of the other branch, of a newer version, or without tables."""
 
     def look(connection: Connection) -> str:
         current = recognize(connection)

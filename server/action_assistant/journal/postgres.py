@@ -99,7 +99,8 @@ class PostgresSession:
         await_only(self._raw.execute(command))
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
-        """Write events and ends of streams; a transaction of its own if none is open."""
+        """Write events, each with its link of the hash chain, and the new end of each stream (the
+        number and link of its last event). If no transaction is open, this is one of its own."""
         columns = [(e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position) for e, _ in events]
         values = [list(column) for column in zip(*columns, strict=True)]
         heads = {event.stream: (event.seq, chain) for event, chain in events}

@@ -244,9 +244,9 @@ class Sqlite:
             raise CannotStart(f"Cannot open {self._the}: {self._why(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
-        """Call `question` with a read-only connection to the file, if it exists. A normal
-        connection would already change the file's journal mode. Raise CannotStart if it cannot be
-        read."""
+        """Call `question` with a read-only connection to the file, and ignore its result; do
+        nothing if there is no file. A normal connection would already change the file's journal
+        mode. Raise CannotStart if the file cannot be read, and what `question` raises."""
         if not self._path.exists():
             return
         with _readable(self._path) as path:

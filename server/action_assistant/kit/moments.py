@@ -19,8 +19,8 @@ def moment(us: int) -> datetime:
 
 
 def sent_us(sent: datetime, path: str) -> int:
-    """Return a date that a client sent in microseconds UTC. `path`: of its field in the body. Raise
-    BadInput for one without a time zone, or before 1970 or after 2999."""
+    """Return a date that a client sent, in microseconds UTC. `path`: the path of its field in the
+    body. Raise BadInput for one without a time zone, or before 1970 or after 2999."""
     if sent.tzinfo is None:
         raise BadInput("A time names its time zone.", where={"path": path})
     if not 0 <= (sent - _EPOCH).total_seconds() < (_LATEST - _EPOCH).total_seconds():

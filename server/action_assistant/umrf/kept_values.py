@@ -104,9 +104,10 @@ def kept_outputs(action: Action) -> tuple[KeptOutput, ...]:
 
 
 def with_keepers(piece: Graph, action: Action, *, taken_on_false: bool) -> Graph:
-    """Return a piece with keepers of the outputs of its action. `taken_on_false`: other actions
-    also take the outputs when the action ends with false; the piece then stays RUNNING, and ends
-    FINISHED only for true."""
+    """Return a piece with keepers added: actions that hold the outputs of `action`, so that an
+    answer of the robot shows them. `taken_on_false`: other actions need the outputs also when the
+    action ends with false. With it, the piece ends (FINISHED) only when the action ends with true;
+    when it ends with false, the piece stays RUNNING, and its keepers hold the outputs."""
     outputs = slots_of(action.outputs)
     keepers: list[Action] = []
     arrows: list[Relation] = []
@@ -142,7 +143,7 @@ def _types(action: Action) -> dict[str, str]:
 def _remap(outputs: tuple[str, ...], types: Mapping[str, str], number: int) -> tuple[Remap, ...]:
     """Return the renamings of an action's outputs (sorted names) on the arrow to the keeper with
     this number. The outputs that this keeper takes get the names of its inputs, all others get
-    names that keep the order and are no inputs. `types`: of the outputs by name."""
+    names that keep the order and are no inputs. `types`: the types of the outputs, by name."""
     first = number * _OUTPUTS_EACH
     names: list[Remap] = []
     for index, output in enumerate(outputs):

@@ -24,10 +24,10 @@ _KEY: Final = "\N{SYMBOL FOR NULL}"
 
 
 def as_one_step(graph: Graph, problems: Sequence[Problem], facts: EngineFacts) -> dict[str, str]:
-    """Return, by code of a problem, a sentence that names actions which, moved into a sub-graph,
-    would take the first problem of that code away. A code is missing if no such actions were found.
-    `graph`: has the robot of each action as its actor; `problems`: as `led_problems` returns;
-    `facts`: the engine build."""
+    """Return sentences that propose to move some actions into a sub-graph, by the code of a
+    problem. Moving the actions that a sentence names would solve at least the first problem with
+    that code. A code is missing if no such actions were found. `graph`: has the robot of each
+    action as its actor; `problems`: the result of `led_problems`; `facts`: the engine build."""
     found: dict[str, str] = {}
     if len(graph.actions) > _LARGEST:
         return found

@@ -165,10 +165,10 @@ def outcome_of_subgraph(
     inside: Inside,
 ) -> Precondition | None:
     """Return the outcome of a piece that is a sub-graph; None where its states do not show it.
-    `piece`: the name under which it ran; `states`: of the piece and of its action; `seen`: of the
-    graphs and actions inside; `inside`: the graphs by name. The result of a graph is the result of
-    the action which reached its exit. Which one did is unknown, so the outcome counts only if every
-    action that may have done so has the same one."""
+    `piece`: the name under which it ran; `states`: the states of the piece and of its action;
+    `seen`: the states of the graphs and actions inside; `inside`: the graphs by name. The result of
+    a graph is the result of the action which reached its exit. Which one did is unknown, so the
+    outcome counts only if every action that may have done so has the same one."""
     by_states = outcome_of(*states)
     may_be = _results_of(_part_of(piece, action), action.name, seen, inside, 0)
     match by_states:

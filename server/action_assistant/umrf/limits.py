@@ -118,9 +118,10 @@ def inputs_of(
     inside: Mapping[str, Graph],
     received: Mapping[Key, Collection[str]] | None = None,
 ) -> LimitedInputs:
-    """Return the inputs of all actions of a graph, and of the graphs inside of it by name. Left out are
-    those in `received`, by key of their action: the runner sends each action of the graph by itself,
-    with the values that it has received for these inputs."""
+    """Return the inputs of all actions of a graph and of its sub-graphs, grouped by the last part
+    of their flat names. `inside`: the sub-graphs by name. `received`: the flat names of inputs of
+    the outer graph that are left out, by the key of the action. In a led run the runner gets the
+    values of these inputs from earlier actions, and knows them only when it sends the action."""
     found: dict[str, list[LimitedInput]] = {}
     for key, each in _inputs(graph):
         if received is None or each.name not in received.get(key, ()):

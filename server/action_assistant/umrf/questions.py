@@ -292,8 +292,8 @@ def title_of(name: str) -> str:
 
 
 def question_of(name: str, inputs: Mapping[str, Any]) -> Question:
-    """Return the question that a ready-made action asks. `name`: of the action; `inputs`: its values by
-    flat name. Raise WrongQuestion if one of them is missing or wrong."""
+    """Return the question that a ready-made action asks. `name`: the name of the action; `inputs`:
+    its values by flat name. Raise WrongQuestion if one of them is missing or wrong."""
     for found in _question_faults(name, inputs):
         raise found
     kind = _KINDS[name]

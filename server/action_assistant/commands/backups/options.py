@@ -85,7 +85,7 @@ _SECONDS: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 def add_rules(parser: argparse.ArgumentParser, prefix: str) -> None:
     """Add two options to a parser: for how many backups stay, and for the command that takes them
-    elsewhere. `prefix`: of their names."""
+    elsewhere. `prefix`: the prefix of their names."""
     parser.add_argument(
         f"{prefix}keep",
         type=rule,

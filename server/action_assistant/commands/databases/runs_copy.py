@@ -73,8 +73,8 @@ FROM {SCHEMA}.event WHERE stream LIKE 'run/%'
 
 async def once(copier: "RunsCopier", name: str) -> int:
     """Copy the events that are new, close the copier, and return the exit code: 1 if archives are
-    missing. `name`: of the database, for messages. Raise CannotStart if a database cannot be used.
-    """
+    missing. `name`: the name of the database, for messages. Raise CannotStart if a database cannot
+    be used. """
     try:
         copied = await copier.catch_up()
     except _FAULTS as error:
@@ -88,8 +88,8 @@ async def once(copier: "RunsCopier", name: str) -> int:
 
 
 async def followed(copier: "RunsCopier") -> int:
-    """Copy new events again and again, and wait and retry while the database is away. It never
-    returns, but closes `copier` when it is cancelled."""
+    """Copy new events again and again, and wait and retry while the database is away. It runs
+    until it is cancelled, and then closes `copier`."""
     away = False
     try:
         while True:

@@ -342,8 +342,8 @@ class Folder:
 
     def _remembered(self, path: Path) -> dict[str, SyncedFile]:
         """Return the entries of the stored state. An entry that is malformed or names no file of
-        this folder is reported and not used, but stays stored. `path`: of the state, for messages.
-        Raise CannotStart if the state cannot be read."""
+        this folder is reported and not used, but stays stored. `path`: the path of the state, for
+        messages. Raise CannotStart if the state cannot be read."""
         try:
             text = self.read(_STATE)
             entries = {} if text is None else msgspec.json.decode(text, type=dict[str, msgspec.Raw])

@@ -49,8 +49,8 @@ class DeviatingCourses:
 
     def _note_alone(self, number: int) -> None:
         """Remember, from the baseline course, that if only this one action runs and nothing that it
-        can reach was touched, the graph ends as in the baseline. `number`: of the instant in the
-        baseline whose touched actions are examined."""
+        can reach was touched, the graph ends as in the baseline. `number`: the number of the
+        instant in the baseline whose touched actions are examined."""
         course = self.course
         for index in course.touched[number]:
             if index == self.net.exit or course.state(index, number + 1).does != RUNS:

@@ -188,8 +188,8 @@ def _asked(
 ) -> EdgeQuestion | None:
     """Return an edge in numbers; None if the engine aborts at this edge, since the child is missing
     or does not list the parent. `outputs`: the parent's outputs that have a value before its first
-    run, and all of its outputs. `indices`: of the actions; `bits`, `slots`: by index of the action,
-    the bits of its required parents and of its inputs."""
+    run, and all of its outputs. `indices`: the indices of the actions; `bits`, `slots`: by index of
+    the action, the bits of its required parents and of its inputs."""
     link = edge.child.links.get(parent.full_name) if edge.child is not None else None
     if edge.child is None or link is None:
         return None

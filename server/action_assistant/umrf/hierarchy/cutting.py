@@ -77,7 +77,8 @@ class Selection(NamedTuple):
 
 
 def selection_of(graph: Graph, chosen: Collection[Key]) -> Selection:
-    """Return the selection of the actions with the keys `chosen` in a graph."""
+    """Return the actions of a graph with the keys `chosen`, and the arrows that come in to them,
+    stay among them and go out from them. Keys without an action are ignored."""
     actions = {action.key: action for action in graph.actions if action.key in chosen}
     inside, ordered = actions.keys(), in_order(graph.relations, by_parent=False)
     into = tuple(r for r in ordered if r.child in inside and r.parent not in inside)
@@ -233,8 +234,8 @@ def cut(
     selection: Selection, name: str, key: Key, plan: CutPlan
 ) -> CutGraphs | tuple[FlatteningReason, ...]:
     """Return the graphs that the cut of a selection makes, or the reasons for which values cannot
-    pass between them. `name`: of the new graph; `key`: of the action that stands for it; `plan`:
-    the way to cut."""
+    pass between them. `name`: the name of the new graph; `key`: the key of the action that stands
+    for it; `plan`: the way to cut."""
     given = _given(selection)
     inner = _inner(selection, name, plan, given)
     action = replace(

@@ -114,8 +114,10 @@ def inputs_of(graph: Graph) -> frozenset[str]:
 
 
 def courses_graph(graph: Graph, given: Collection[str]) -> Graph:
-    """Return the graph as if its entry actions had values for the inputs `given` (flat names),
-    without renamings on the arrows to them."""
+    """Return the form of a graph whose courses are examined: its entry actions have a value for
+    each input that gets one from outside. `given`: the flat names of the values from outside,
+    before the renamings of the arrows from the entry. If there are any, these arrows have no
+    renamings in the result."""
     taken: dict[str, set[str]] = {}
     inputs = {action.key: slots_of(action.inputs) for action in graph.actions}
     for entry in ends_of(graph)[0]:

@@ -340,8 +340,9 @@ class Core(Clock):
             self._ended(graph, node, _OUTCOMES[returned.result])
 
     def _play(self, number: int) -> None:
-        """Let the script play a call that a performer was given and does not carry out; do nothing if
-        there is no such call. One that was told to stop meanwhile ends without having begun."""
+        """Let the script play a call that was given to a performer, which does not carry it out. Do
+        nothing if there is no such call. An action that got a stop meanwhile ends without having
+        begun."""
         found = self._performed.play(number)
         if found is None:
             return
@@ -473,7 +474,7 @@ class Core(Clock):
     def _stop_failed(self, graph: Running, node: Node, token: int) -> None:
         """Show ERROR after `onStop` threw or the stop timeout passed, while the code of the action
         continues. When that code returns, the children are informed as of any other result.
-        `token`: of the stop; do nothing if the action has changed since."""
+        `token`: the token of the stop; do nothing if the action has changed since."""
         if node.token != token or node.state != "STOPPING":
             return
         node.token += 1

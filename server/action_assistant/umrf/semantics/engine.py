@@ -178,8 +178,9 @@ class Engine(Graphs):
         return self._taken()
 
     def play(self, number: int, at_ms: float) -> list[Trace]:
-        """Let, at `at_ms`, the script play a call that the performer was given and will not carry
-        out: only now it begins. Return the trace up to then."""
+        """Let the script, from `at_ms` on, play the call with this number, which was given to the
+        performer. The performer will not carry the call out, and the action begins only now. Return
+        the trace up to `at_ms`."""
         self._run_until(at_ms)
         if not self.crashed:
             self._play(number)

@@ -58,7 +58,8 @@ class GraphPrinter:
         messages: Mapping[str, Sequence[tuple[int, str]]],
     ) -> str:
         """Return the text of the graph as the engine prints it, in this state and with these states
-        of its actions, by full name. `messages`: of each action as (ms since 1970, text)."""
+        of its actions, by full name. `messages`: the messages of each action as (ms since 1970,
+        text)."""
         actions = ",".join(
             self._action(
                 node, states.get(node.full_name, "UNINITIALIZED"), messages.get(node.full_name, ())

@@ -111,7 +111,8 @@ class DailyRows:
         return found
 
     def begin(self, at: int) -> None:
-        """Begin another day, if `at` is in one."""
+        """Set the counts of rows to zero if the time `at` (µs UTC) is in another day than the one
+        counted so far."""
         day = at // _DAY_US
         if day != self._day:
             self._day, self.rows = day, 0

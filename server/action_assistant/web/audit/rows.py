@@ -282,7 +282,8 @@ def _utc(at: int) -> datetime:
 
 
 def kinds_of(names: Iterable[str]) -> tuple[AuditKind, ...]:
-    """Return the kinds of these names. Raise ValueError for an unknown one."""
+    """Return the kinds of the audit with these names, in their order. Raise ValueError for an
+    unknown name."""
     by_name = {kind: kind for kind in AUDIT_KINDS}
     asked = tuple(names)
     for name in asked:

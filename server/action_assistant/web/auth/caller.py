@@ -61,8 +61,10 @@ def client_network(connection: "ASGIConnection[Any, Any, Any, Any]") -> str:
 
 
 def network_of(host: str) -> str:
-    """Return the network of an address: an IPv4 address itself, the /64 of an IPv6 address, all of
-    which one client may have. Text that is no address is its own network."""
+    """Return the network whose addresses limits count as one client. For an IPv4 address this is
+    the address itself; for an IPv6 address its /64 network, since one client can own all of it; for
+    an IPv4-mapped IPv6 address the IPv4 address. ::1, and text that is no address, are returned
+    unchanged."""
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:

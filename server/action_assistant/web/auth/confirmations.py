@@ -101,9 +101,10 @@ class Confirmations:
     def confirm(
         self, session_id: str, how: ConfirmedBy, *, is_stored: bool = False
     ) -> Confirmation:
-        """Keep that the person of a session is confirmed now, and return the sealed record of that,
-        for other runners. Raise ValueError for a malformed id. With `is_stored` raise Unavailable if
-        the file could not be written: then only this process knows of it."""
+        """Record that the person of a session has confirmed now that they use it, and return the
+        sealed record, which other processes of this server accept. Raise ValueError if the id of
+        the session is malformed. If the file cannot be written, only this process knows of the
+        confirmation; with `is_stored`, raise Unavailable then."""
         if _ID.fullmatch(session_id) is None:
             raise ValueError(f"{session_id!r} is no id of a session")
         plain = Confirmation(session_id, self._clock(), how, "")
@@ -178,7 +179,8 @@ class Confirmations:
                         path.unlink(missing_ok=True)
 
     def _keep(self, made: Confirmation, *, is_stored: bool = False) -> None:
-        """Keep a confirmation in memory and as a file. A full disk is an error with `is_stored` only."""
+        """Store a confirmation in memory and as a file. If the file cannot be written, log this;
+        with `is_stored`, raise Unavailable."""
         self._remember(made.session, self._known_now(made))
         path = self._path(made.session)
         part = self._folder / f"{made.session}.{random_id()}.part"  # both processes may write

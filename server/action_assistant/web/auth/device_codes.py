@@ -98,10 +98,11 @@ class DeviceCodes:
         return DeviceCode(made.id, f"{made.code[:4]}-{made.code[4:]}", CODE_SECONDS)
 
     def claim(self, text: str, browser: str, address: str) -> WaitingDevice:
-        """Take the code `text` for the new device `browser` at `address`, and return what that
-        device waits with for the confirmation. A code can be taken once, also if several devices
-        send it at the same time. Raise Unauthenticated for an unknown, old or used code, TooMany
-        if all devices together have tried too many codes just now."""
+        """Use up the code `text`, which the new device `browser` has sent from the network address
+        `address`. Return the claim by which that device asks whether it was confirmed, with the
+        number that both devices show. A code works once, also if several devices send it at the
+        same time. Raise Unauthenticated for an unknown, expired or used code, TooMany if all
+        devices together have tried too many codes just now."""
         self._forget_old()
         if self._guesses is not None and not self._guesses.take():
             raise TooMany("Too many codes are tried just now; wait a minute, or ask for a link.")

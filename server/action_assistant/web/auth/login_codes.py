@@ -120,8 +120,8 @@ class LoginCodes:
         address: str,
         network: str = "",
     ) -> LoginBegun:
-        """Begin a login. `network`: of the address, "" for the address itself. Raise TooMany if too
-        many wait, of this network or of all."""
+        """Begin a login. `network`: the network of the address, "" for the address itself. Raise
+        TooMany if too many logins wait, from this network or from all."""
         network = network or address
         self._forget()
         of_network = sum(each.network == network for each in self._logins.values())
@@ -161,7 +161,9 @@ class LoginCodes:
         login.state, login.confirmed = "confirmed", word
 
     def refuse(self, code: str, person: str) -> None:
-        """Refuse a login. Raise NotFound, TooMany or Conflict as `confirm` does."""
+        """Refuse the login with this code. `person`: the id of the person who refuses it. Raise
+        NotFound if there is no such login, TooMany if this person tries too often, Conflict if the
+        login was confirmed or refused already."""
         login = self._find(code, person)
         if login.state != "waiting":
             raise Conflict("This code was used already.")

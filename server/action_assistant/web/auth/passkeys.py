@@ -169,8 +169,8 @@ class Passkeys:
 
     @_locked
     def begin_registration(self, by: Identity, session: Session, origin: str) -> dict[str, Any]:
-        """Return the options for `navigator.credentials.create`. `origin`: of the page that asks. Raise
-        BadInput where browsers allow no passkeys."""
+        """Return the options for `navigator.credentials.create`. `origin`: the origin of the page
+        that asks. Raise BadInput where browsers allow no passkeys."""
         from webauthn import generate_registration_options
         from webauthn.helpers.structs import (
             AuthenticatorSelectionCriteria,

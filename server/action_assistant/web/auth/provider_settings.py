@@ -93,7 +93,8 @@ def groups_of(text: str) -> dict[str, Role]:
 
 
 def name_of(text: str) -> str:
-    """Return the name of a provider for people. Raise CannotStart if it is too long."""
+    """Return the name under which people see a provider: the text of the setting with single
+    spaces. Raise CannotStart if it has more than 60 characters."""
     name = " ".join(text.split())
     if len(name) > _NAME:
         raise CannotStart(f"{_OIDC}NAME has up to {_NAME} characters.")

@@ -288,8 +288,8 @@ class SessionGuards:
         self, credential: Credential, *, outlives: bool = False, follows_groups: bool = False
     ) -> Iterator[SessionGuard]:
         """Cancel the current task when the session or token ends, or its person has another role.
-        `outlives`: not when it merely expires; `follows_groups`: also when the person has other
-        groups."""
+        `outlives`: the task goes on when the session or token merely expires; `follows_groups`:
+        cancel the task also when the person has other groups."""
         task = asyncio.current_task()
         if task is None:
             raise RuntimeError("only a task can be cancelled")

@@ -104,8 +104,8 @@ class SessionFiles:
         self._noted[session.id] = noted
 
     def use(self, session: str) -> None:
-        """Note that the session with this id is used now, at most once a minute. A full disk is no
-        error."""
+        """Record that the session with this id is used now, at most once a minute. Raise nothing if
+        the disk is full or the session has no file."""
         now = time.time()
         if 0 <= now - self._used.get(session, 0.0) < _USE_S:
             return
@@ -164,8 +164,9 @@ class SessionFiles:
         self._forget(self._path(session))
 
     def end_all_of(self, person: str, *, but: str | None = None) -> "EndedSessions":
-        """End the sessions of a person, also idle ones, except the one with the id `but`: all of them,
-        also where the folder cannot store that of some."""
+        """End all sessions of a person, idle ones too, except the session with the id `but`. Raise
+        nothing if the folder cannot store the end of a session: that session has then ended in this
+        process, and the result says why other processes may not know it."""
         theirs = [each.id for each in self._stored() if each.person.id == person and each.id != but]
         unwritten: list[Unavailable] = []
         for each in theirs:

@@ -364,8 +364,9 @@ class Sessions:
         return [made]
 
     def farewell(self, request: _Asking, unwritten: Unavailable | None = None) -> Response[None]:
-        """Return the answer that deletes the session cookie. `unwritten`: why other processes may
-        not know of the end of the session."""
+        """Return the answer that deletes the session cookie. `unwritten`: the error by which the
+        end of the session was not stored, so that other processes may still accept it; the answer
+        then has the status and body of this error."""
         content: Any = None if unwritten is None else problem_of(unwritten)
         response: Response[None] = Response(
             content,

@@ -68,8 +68,9 @@ def shared_token_routes(
 
 
 def adoption(tokens: TokenFiles, *, limits: bool) -> list[ControllerRouterHandler]:
-    """Return the route by which a process with a data folder of its own gets to know a token: the
-    runner, which may be on another computer."""
+    """Return the route of the runner that receives the record of a token which the editor has made.
+    The runner needs this record to accept the token where it has a data folder of its own, as on
+    another computer. `limits`: refuse too many requests from one network."""
     pace = TokenBuckets(_AT_ONCE, _PER_MINUTE / 60) if limits else None
 
     @post(

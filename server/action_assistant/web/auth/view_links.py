@@ -96,8 +96,9 @@ class ViewLinks:
         self._written: dict[str, float] = {}  # the last write of openings, on the monotonic clock
 
     def opens(self, text: str) -> View | None:
-        """Return the link with this key; None if the text does not begin as such a key does. Raise
-        Unauthenticated or Withdrawn if it shows nothing, or nothing any more."""
+        """Return what the link with the key `text` shows; None if `text` does not have the prefix
+        of such keys. Raise Withdrawn if the link was revoked, Unauthenticated if the key is
+        malformed or unknown, or if the link has expired."""
         if not text.startswith(_PREFIX):
             return None
         found = _KEY.fullmatch(text)

@@ -131,8 +131,8 @@ class Addresses:
 
     def replaced_host(self, header: str | None, origin: str) -> str | None:
         """Return a sentence if a proxy replaced the Host header of a request from the public page,
-        else None. `origin`: of the page that sent the request. Such a request would seem to come
-        from a page of this computer."""
+        else None. `origin`: the origin of the page that sent the request. Such a request would seem
+        to come from a page of this computer."""
         public = self._public
         if public is None or origin != public.origin or self.public_at(header or ""):
             return None
@@ -143,7 +143,7 @@ class Addresses:
 
     def runner_at(self, header: str, port: int) -> str:
         """Return the URL of the runner, without a final slash, for a client that sent this Host
-        header. `port`: of the runner, if no proxy stands between."""
+        header. `port`: the port of the runner, if no proxy stands between."""
         public = self.public_at(header)
         return public.runner if public is not None else self.direct(header, port)
 

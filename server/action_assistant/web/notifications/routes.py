@@ -14,9 +14,9 @@ from action_assistant.web.notifications.sender import Notifications
 def notification_routes(
     notifications: Callable[[], Notifications], tested: Callable[[str, str], None]
 ) -> list[ControllerRouterHandler]:
-    """Return the routes under `/api/notifications`, for owners. `notifications` returns those of the
-    open process; `tested` keeps who sent a test: it gets the name of the
-    receiver and the id of the person."""
+    """Return the routes under `/api/notifications`, for owners. `notifications` returns the sender
+    of notifications, which exists only once the process is set up. `tested` records a test: it is
+    called with the name of the receiver and the id of the person who sent the test."""
 
     @get(
         "/api/notifications",

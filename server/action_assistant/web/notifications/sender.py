@@ -90,9 +90,10 @@ class Notifications:
         return await self.outbox.states(self.receivers, self._kinds)
 
     async def test(self, name: str, person: str) -> ReceiverState:
-        """Send a test to a receiver, which is on again if it takes it; return its state. `person`:
-        the name of the person who asks for it. Raise NotFound if there is no such receiver, TooMany
-        while a test goes on."""
+        """Send a test message to the receiver `name`, and return the state of the receiver. A
+        receiver that accepts the test is switched on again, if it was switched off after failures.
+        `person`: the name of the person who asks for the test. Raise NotFound if there is no such
+        receiver, TooMany while another test of this receiver is under way."""
         receiver = next((each for each in self.receivers if each.name == name), None)
         if receiver is None:
             raise NotFound(f"There is no receiver {name!r}.")
@@ -166,8 +167,8 @@ class Notifications:
             await self._switch_off(receiver, why if is_final else f"{why} {_GIVEN_UP}", now)
 
     async def _named(self, message: Message) -> Message:
-        """Return a message as it may be sent now: without the name of a graph that not everybody may
-        see, or of which that is not known."""
+        """Return a message as it may be sent now: without the name of a graph if not everybody may
+        see the graph, or if this cannot be found out."""
         try:
             seen = await self._seen_by_all(message)
         except Exception:  # a failed look at rights holds no message back: it names nothing then

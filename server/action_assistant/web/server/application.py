@@ -71,16 +71,15 @@ def application(
     mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """Return the whole ASGI application of a process. `title`: of its OpenAPI document; `keys`,
-    `revoked`: how clients are authenticated; `addresses`, `page_port`: the hosts and origins that
-    may call it; `lifespan`: contexts for as long as it runs. `body_limit`: bytes of a request body,
-    unless a route has its own limit. `page`, `help_site`, `runner_port`: only for the editor, which
-    serves the built page and the documentation, and names the runner in the
+    """Return the whole ASGI application of a process. `title`: the title of its OpenAPI document;
+    `keys`, `revoked`: how clients are authenticated; `addresses`, `page_port`: the hosts and
+    origins that may call it; `lifespan`: contexts for as long as it runs. `body_limit`: bytes of a
+    request body, unless a route has its own limit. `page`, `help_site`, `runner_port`: only for the
+    editor, which serves the built page and the documentation, and names the runner in the
     Content-Security-Policy. `mount`: the path at which a proxy serves this process. `scraped`: the
     token that allows /metrics only. `tokens`: the tokens of programs; `views`: the links that show
-    one thing, `frames`: the origins of sites that may show these in a frame. `standings`: knows what
-    sessions and tokens are worth now. Raise CannotStart if a route declares no right.
-    """
+    one thing, `frames`: the origins of sites that may show these in a frame. `standings`: knows
+    what sessions and tokens are worth now. Raise CannotStart if a route declares no right. """
     handlers = [
         *route_handlers,
         *_health(monitoring),

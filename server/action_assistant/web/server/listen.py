@@ -64,9 +64,11 @@ def serve(
 ) -> None:
     """Bind `host` and `port`, then make the application and serve it until the process is told to
     end or its parent dies. `identity`: serve TLS with its certificate. `proxies`: addresses whose
-    forwarding headers are trusted. `direct`: let applications take over their sockets. `publish`:
-    entered with the URL for programs of this computer once the application is set up, and left when
-    it shuts down. Raise CannotStart if the address is taken or unknown."""
+    forwarding headers are trusted. `direct`: let the application take over WebSockets, so that
+    their binary messages reach it without the server's queues (`direct.py`). `publish`: called with
+    the URL by which programs on this computer reach the process; its context is entered once the
+    application is set up, and left when it shuts down. Raise CannotStart if the address is taken or
+    unknown."""
     sockets = bound(host, port)
     try:
         if identity is not None:
