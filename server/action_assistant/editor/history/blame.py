@@ -87,9 +87,9 @@ class Blame:
 
     async def of_field(self, graph: str, owner: str, field: str, seq: int | None) -> bytes:
         """Return the JSON of all values that people gave a field of an action, arrow or note
-        (`owner`: its key) up to `seq` (None: now), newest first, as `FieldValue`s; values that were
-        overwritten at once are among them. What one person typed in one go is one value. Raise
-        Unavailable if the journal cannot be read."""
+        (`owner`: its key) up to `seq` (None: now), newest first, as `FieldValue`s; values that lost
+        against a concurrent edit are among them. What one person typed in one go is one value.
+        Raise Unavailable if the journal cannot be read."""
         upto = await bring_up(self._index, graph, seq)
         at = upto if seq is None else seq
         return await self._index.text(values_of, graph, owner, field, at)
@@ -135,8 +135,8 @@ def values_of(
 def steps(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> list[DocumentStep]:
-    """Return the newest `limit` changes of keys in a graph, and values overwritten at once, with
-    `after < seq <= upto`, oldest first."""
+    """Return the newest `limit` changes of keys in a graph, and values that lost against a
+    concurrent edit, with `after < seq <= upto`, oldest first."""
     found = [
         DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
         for c in index_queries.between(connection, graph, after, upto, limit)
@@ -168,8 +168,8 @@ def _values(
 
 
 def _overwritten(connection: Connection, lost: Sequence[OverwrittenValue]) -> list[FieldValue]:
-    """Return the values of a field that were overwritten at once (`lost`); of several that one
-    person typed in one go, only the last."""
+    """Return the values of a field that lost against a concurrent edit (`lost`); of several that
+    one person typed in one go, only the last."""
     person = stored_people(connection)
     last = [
         each

@@ -209,8 +209,9 @@ def _told(
     gone: State,
 ) -> Changes:
     """Return the difference that one person made to the things they touched, without later changes
-    by others. `own`: the old and new value of each key; `lost`: their values that were overwritten
-    at once; `state`: all values after the changes; `gone`: the last names of deleted actions."""
+    by others. `own`: the old and new value of each key; `lost`: their values that lost against a
+    concurrent edit; `state`: all values after the changes; `gone`: the last names of deleted
+    actions."""
     owners = {owner_of(*place) for place in own}
     around = _around(owners, state)
     before = around | {place: old for place, (old, _) in own.items()}

@@ -47,9 +47,9 @@ class IndexGrowth(msgspec.Struct, frozen=True):
     """The rows that the index lacks, as slices of MessagePack, and the next head: `seq` and
     `document`.
 
-    `slices`: of changes; `overwritten`: of values that were overwritten at once. `after`: the present
-    head. `leftovers`: rows after it exist from an interrupted attempt. `unreadable`: the document of
-    the head is of another version, so the index must be built again.
+    `slices`: slices of changes; `overwritten`: slices of values that lost against a concurrent
+    edit. `after`: the present head. `leftovers`: rows after it exist from an interrupted attempt.
+    `unreadable`: the document of the head is of another version, so the index must be built again.
     """
 
     after: int
@@ -104,8 +104,8 @@ def between(
 def overwritten_between(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> list[OverwrittenValue]:
-    """Return the newest `limit` values in a graph with `after < seq <= upto` that were overwritten
-    at once, in order of time."""
+    """Return the newest `limit` values in a graph with `after < seq <= upto` that lost against a
+    concurrent edit, in order of time."""
     chosen = _OVERWRITTEN.where(_o.graph == graph, _o.seq > after, _o.seq <= upto)
     newest_first = chosen.order_by(_o.seq.desc(), _o.root, _o.key).limit(limit)
     return [OverwrittenValue._make(row) for row in connection.execute(newest_first)][::-1]
@@ -115,7 +115,7 @@ def overwritten_of_key(
     connection: Connection, graph: str, root: Root, key: str, upto: int
 ) -> list[OverwrittenValue]:
     """Return the values of one key (in the map `root`) of a graph, up to the change `upto`, that
-    were overwritten at once, in order of time."""
+    lost against a concurrent edit, in order of time."""
     same = (_o.graph == graph, _o.root == root, _o.key == key, _o.seq <= upto)
     chosen = _OVERWRITTEN.where(*same).order_by(_o.seq)
     return [OverwrittenValue._make(row) for row in connection.execute(chosen)]

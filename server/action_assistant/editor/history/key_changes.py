@@ -30,7 +30,7 @@ _OUTCOMES: Final = frozenset(PRECONDITIONS)
 
 
 class LostValue(NamedTuple):
-    """A value that `author` gave a key, and that another one overwrote at once."""
+    """A value that `author` gave a key, and that lost against a concurrent edit."""
 
     author: str
     root: Root
@@ -190,8 +190,8 @@ class LoggedChange(NamedTuple):
 
 
 class OverwrittenValue(NamedTuple):
-    """The event `seq` brought a value of a key of a root map that another value overwrote at once: the key went
-    on showing the value `stands`, None where it was deleted.
+    """The event `seq` brought a value for a key of a root map, and this value lost against a
+    concurrent edit: the key kept the value `stands`, None where it was deleted.
 
     `at`: microseconds since 1970, UTC.
     """

@@ -363,7 +363,7 @@ class Members:
             await asyncio.to_thread(_try, self._write_groups)
 
     async def look(self, proof: str) -> Invited | None:
-        """Return the role and the name that a personal link gives; None if `proof` is not that of a
+        """Return the role and the name that a personal link gives; None if `proof` belongs to no
         personal link. Raise Unauthenticated or Withdrawn if the link is no longer valid."""
         link, _, secret = proof.partition(".")
         expected = self._keys.secret_of(link)
