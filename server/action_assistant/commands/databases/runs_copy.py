@@ -74,7 +74,7 @@ FROM {SCHEMA}.event WHERE stream LIKE 'run/%'
 async def once(copier: "RunsCopier", name: str) -> int:
     """Copy the events that are new, close the copier, and return the exit code: 1 if archives are
     missing. `name`: the name of the database, for messages. Raise CannotStart if a database cannot
-    be used. """
+    be used."""
     try:
         copied = await copier.catch_up()
     except _FAULTS as error:

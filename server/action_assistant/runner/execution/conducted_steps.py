@@ -366,9 +366,9 @@ def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
 
 
 def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
-    """Return the event that says how far it is proven that a piece is at rest (that nothing of it
-    moves). `at`: µs UTC; `asks`: the piece has ended without an outcome, and a person has to state
-    one."""
+    """Return the event that says whether, and by what, a piece is proven to be at rest (nothing of
+    it moves). `at`: µs UTC; `asks`: the piece has ended without an outcome, and a person has to
+    state one."""
     assert piece.piece is not None
     stops = piece.desired == "stopped" and piece.end is None
     since = piece.stop_requested_at or piece.requested_at
@@ -483,7 +483,7 @@ def piece_to_send(
 
 
 class RestNews:
-    """Reports how far each piece of a run is proven to be at rest, whenever that has changed."""
+    """Reports whether, and by what, each piece of a run is proven to be at rest, at each change."""
 
     def __init__(self, tell: Callable[[PieceRest], None], clock_us: ClockUs) -> None:
         self._tell = tell
@@ -491,7 +491,7 @@ class RestNews:
         self._told: dict[str, PieceRest] = {}  # by piece
 
     def show(self, piece: Run, *, asks: bool = False) -> None:
-        """Report whether it is proven that a piece is at rest, and by what, if this has changed
+        """Report whether, and by what, a piece is proven to be at rest, if this has changed
         since the last report. `asks`: the piece has ended without an outcome, and a person is asked
         for the outcome. Later calls report that question too, until the piece moves again."""
         known = self._told.get(piece.id)

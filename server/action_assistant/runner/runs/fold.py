@@ -506,7 +506,7 @@ def _going(event: PieceBegan) -> PieceRest:
 
 
 def _piece_rest(run: Run, event: PieceRest) -> Run:
-    """Return the led run after news about how far a piece is proven to be at rest. Earlier
+    """Return the led run after an event about the proof that a piece is at rest. Earlier
     pieces of the same robot stay listed only while they may move or wait for an outcome."""
     kept = {
         piece: known

@@ -83,8 +83,8 @@ def rests_of(run: Run) -> list[RobotRestShown]:
 
 
 def _rest_view(run: Run, rest: PieceRest) -> RobotRestShown:
-    """Return the view of how far a piece is proven to be at rest. Once the whole run is over, its
-    proof or observation of rest counts for the piece, too."""
+    """Return the view that shows whether, and by what, a piece is proven to be at rest. Once the
+    whole run is over, its proof or observation of rest counts for the piece, too."""
     shown = RobotRestShown(
         rest.engine,
         rest.state,

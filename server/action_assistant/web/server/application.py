@@ -79,7 +79,7 @@ def application(
     Content-Security-Policy. `mount`: the path at which a proxy serves this process. `scraped`: the
     token that allows /metrics only. `tokens`: the tokens of programs; `views`: the links that show
     one thing, `frames`: the origins of sites that may show these in a frame. `standings`: knows
-    what sessions and tokens are worth now. Raise CannotStart if a route declares no right. """
+    what sessions and tokens are worth now. Raise CannotStart if a route declares no right."""
     handlers = [
         *route_handlers,
         *_health(monitoring),
