@@ -2,7 +2,6 @@
 
 import csv
 import io
-import time
 from typing import Any
 
 import httpx
@@ -11,6 +10,7 @@ import msgspec
 from runner.harness import order, sequence
 from runner.process import RunnerProcess, body
 from runner.start.test_start_values import asking
+from support.waiting import until
 
 FAST = {"*": [{"after_s": 0.02}]}
 
@@ -25,12 +25,13 @@ def opened(client: httpx.Client, start: Any, **more: Any) -> dict[str, Any]:
 
 
 def closed(client: httpx.Client, repeat: str) -> dict[str, Any]:
-    """The repeat when nothing of it goes on."""
-    deadline = time.monotonic() + 60
-    while (found := client.get(f"/api/repeats/{repeat}").json())["state"] != "closed":
-        assert time.monotonic() < deadline, found
-        time.sleep(0.05)
-    return dict(found)
+    """Wait until nothing of a repeat goes on, and return it."""
+
+    def found() -> dict[str, Any]:
+        now: dict[str, Any] = client.get(f"/api/repeats/{repeat}").json()
+        return now if now["state"] == "closed" else {}
+
+    return until("the repeat is not closed", found, 60)
 
 
 def test_a_grid_is_carried_out_and_its_table_has_a_run_for_each_cell(

@@ -352,7 +352,11 @@ class _StopTopic(StopSignal):
     def __init__(self, node: Node, topic: str, kind: str, leave: Callable[[], None]) -> None:
         super().__init__()
         self._node, self._topic, self._kind = node, topic, kind
-        self.close = leave  # type: ignore[method-assign]
+        self._leave = leave
+
+    def close(self) -> None:
+        """Receive no more messages of this topic."""
+        self._leave()
 
     def problem(self) -> str:
         """Return what is wrong with who publishes, as part of a sentence; "" if nothing is."""
