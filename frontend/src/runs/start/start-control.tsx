@@ -63,6 +63,7 @@ export function StartControl(props: Props) {
     : simulated
       ? "in the simulator"
       : `on ${engines.map(isolated).join(", ")}`;
+  const short = led ? "led" : simulated ? "simulator" : where;
   const first = start.isPending
     ? "Starting …"
     : `${simulated ? "Run" : "Start"} ${isolated(label)}`;
@@ -75,7 +76,7 @@ export function StartControl(props: Props) {
       {simulated && !asks ? (
         <StartButton
           icon={thumb ? undefined : icon}
-          label={thumb ? <TwoLines first={first} second="simulator" /> : compact ? first : run}
+          label={thumb ? <TwoLines first={first} second={short} /> : compact ? first : run}
           name={why === null ? run : `${first}: ${why}`}
           question={
             goes
@@ -98,7 +99,9 @@ export function StartControl(props: Props) {
           }
           onClick={ask}
         >
-          <span aria-hidden>{thumb ? <TwoLines first={first} second={`${where} …`} /> : wide}</span>
+          <span aria-hidden className={thumb ? "min-w-0" : undefined}>
+            {thumb ? <TwoLines first={first} second={`${short} …`} /> : wide}
+          </span>
           <span className="visually-hidden">
             {why === null ? `${first} ${where} …` : `${first}: ${why}`}
           </span>
