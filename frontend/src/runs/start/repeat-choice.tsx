@@ -1,8 +1,9 @@
 /** Choice in the start dialog of how often a start is carried out, and with which values. */
 import { Checkbox, Text, Textarea, TextInput } from "@mantine/core";
-import { useMutation } from "@tanstack/react-query";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";
 import { useLocation } from "wouter";
+import { queryKeys } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { insideOf } from "../../api/inside";
 import { useLive } from "../../api/page-link";
@@ -16,7 +17,7 @@ import { useKeptText } from "../../ui/kept-texts";
 import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import style from "./start-dialog.module.css";
-import { notifyFailure, publishedVersion, type StartInput } from "./use-start";
+import { checkedVersion, notifyFailure, type StartInput } from "./use-start";
 
 const MOST = 500; // runs of one repeat
 
@@ -145,6 +146,7 @@ export function useRepeatChoice(
 /** Open a repeat of exactly what was looked at, and go to its page. */
 export function useOpenRepeat(graph: string) {
   const { runner } = useLive();
+  const client = useQueryClient();
   const [, go] = useLocation();
   return useMutation({
     mutationFn: async ({ repeat, ...wanted }: StartInput & { repeat: RepeatOrder }) => {
@@ -160,10 +162,9 @@ export function useOpenRepeat(graph: string) {
         ...rest
       } = wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
-      const { version, umrf } = await publishedVersion(graph, await seq);
-      if (digest !== version.digest || (tree ?? version.tree_digest) !== version.tree_digest) {
-        throw new Error("The graph is not the one that was checked. Nothing was sent.");
-      }
+      // A repeat is opened after a look only.
+      const { version, umrf } = await checkedVersion(graph, await seq, digest ?? "", tree);
+      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
       const order = {
         ...rest,
         runner,

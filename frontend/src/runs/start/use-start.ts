@@ -65,6 +65,24 @@ export function notifyFailure(title: string, message: string): void {
   notifications.show({ color: "red", title, message, autoClose: 15_000 });
 }
 
+/**
+ * Publish the graph as it is at a change, and return that version. Rejects where it is not the one that was checked.
+ * `digest`, `tree`: of what was checked; a null digest where nothing was.
+ */
+export async function checkedVersion(
+  graph: string,
+  seq: number,
+  digest: string | null,
+  tree: string | null | undefined,
+) {
+  const published = await publishedVersion(graph, seq);
+  const { version } = published;
+  const same = digest === version.digest && (tree ?? version.tree_digest) === version.tree_digest;
+  if (digest !== null && !same)
+    throw new Error("The graph is not the one that was checked. Nothing was sent.");
+  return published;
+}
+
 export function useStart(graph: string) {
   const { live, runner } = useLive();
   const client = useQueryClient();
@@ -74,13 +92,8 @@ export function useStart(graph: string) {
         wanted;
       const { breakpoints, values, from } = wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
-      const { version, umrf } = await publishedVersion(graph, await seq);
+      const { version, umrf } = await checkedVersion(graph, await seq, digest, tree);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
-      const same =
-        digest === version.digest && (tree ?? version.tree_digest) === version.tree_digest;
-      if (digest !== null && !same) {
-        throw new Error("The graph is not the one that was checked. Nothing was sent.");
-      }
       const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
       const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
       const started = await surely(what, {
