@@ -1,4 +1,4 @@
-"""Which Python the runner runs under: rclpy works only for the one that it was built for."""
+"""Choice of the Python that runs the runner: rclpy works only for the one that it was built for."""
 
 import hashlib
 import importlib.util

@@ -1,4 +1,4 @@
-"""Where the lines of a process go, in which form, and how much of them.
+"""Logging of a process: the place, the form and the amount of its lines.
 
 What the command line says is put into the environment, where workers and children find it. No form of a line
 shows a secret or lets a text of strangers begin a line.

@@ -1,4 +1,4 @@
-"""Where this program finds what it carries and keeps what it is given."""
+"""Places of the files that this program carries, and of those that it keeps."""
 
 import os
 from pathlib import Path

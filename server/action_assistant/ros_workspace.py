@@ -1,4 +1,4 @@
-"""What a sourced ROS 2 gives to the runner, and to nobody else.
+"""Variables that a sourced ROS 2 gives to the runner, and to nobody else.
 
 A workspace is found by AMENT_PREFIX_PATH, not by PYTHONPATH: that would put whatever lies beside
 rclpy before our own packages, in the editor, too. Only what stands in a prefix's package index comes

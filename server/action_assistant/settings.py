@@ -1,4 +1,4 @@
-"""What a process is told when it starts: command line first, then the environment."""
+"""Settings of a process at its start: command line first, then the environment."""
 
 import os
 import re

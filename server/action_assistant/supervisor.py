@@ -1,4 +1,4 @@
-"""Both processes under one command: started together, restarted when they die, ended together."""
+"""Supervision of both processes under one command: started together, restarted when they die, ended together."""
 
 import os
 import signal

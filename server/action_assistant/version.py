@@ -1,4 +1,4 @@
-"""Which program this is: its version, and the commit that it comes from as far as that is known.
+"""Identity of this program: its version, and the commit that it comes from as far as that is known.
 
 Each wheel has a version of its own, and carries the commit that it was built from
 (scripts/build_version.py). A checkout has the version of pyproject.toml, the same for all commits until

@@ -35,6 +35,9 @@ OPENING: Final = re.compile(
 _TSDOC: Final = re.compile(r"/\*\*\s*(?:\*\s*)?(?P<first>[^\n]*)")
 
 
+_DOCUMENTED: Final = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
 class Docstring(NamedTuple):
     """The documentation of one class, function or file: where it stands and what it says."""
 
@@ -50,8 +53,9 @@ class Docstring(NamedTuple):
 
     @property
     def is_short(self) -> bool:
-        """Return whether the text has too few words to say anything."""
-        return len(self.text.split()) <= SHORT_WORDS
+        """Return whether the text of a class or function has too few words to say anything. The path of a
+        module says the rest of its subject."""
+        return bool(self.name) and len(self.text.split()) <= SHORT_WORDS
 
     def __str__(self) -> str:
         first = self.text.splitlines()[0] if self.text else ""
@@ -74,13 +78,14 @@ def page_files(root: Path, *suffixes: str) -> list[Path]:
 
 
 def docstrings(root: Path) -> Iterator[Docstring]:
-    """Yield the docstring of each class and function of the server that has one."""
+    """Yield the docstring of each module, class and function of the server that has one."""
     for path in python_files(root):
         for node in ast.walk(ast.parse(path.read_text())):
-            if not isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            if not isinstance(node, _DOCUMENTED):
                 continue
             if (text := ast.get_docstring(node)) is not None:
-                yield Docstring(path.relative_to(root), node.lineno, node.name, text)
+                line, name = (1, "") if isinstance(node, ast.Module) else (node.lineno, node.name)
+                yield Docstring(path.relative_to(root), line, name, text)
 
 
 def undocumented(root: Path) -> list[str]:

@@ -1,1 +1,1 @@
-"""What this program asks of the computer that it runs on, and what may be wrong with that."""
+"""Facts of the computer that this program runs on, and faults that it may have."""

@@ -1,1 +1,1 @@
-"""What follows from the events of a run: replay, causes, comparison, sums, files."""
+"""Conclusions from the events of a run: replay, causes, comparison, sums, files."""

@@ -1,4 +1,5 @@
-"""What a start brings to the rules of its robots, and what a second person says yes to. Pure."""
+"""The order of a start: its claim to the rules of its robots, and the values to which a second person says
+yes. Pure."""
 
 import hashlib
 from collections.abc import Collection
