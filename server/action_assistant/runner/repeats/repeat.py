@@ -8,16 +8,16 @@ import hashlib
 import itertools
 import random
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
+from typing import Annotated, ClassVar, Final, TypeAlias
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict
+from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
+from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.sent_graphs import read_sent
-from action_assistant.runner.start.admission import GroupRequest, StartRequest, Watching
-from action_assistant.umrf.digest import digest
+from action_assistant.runner.start.admission import StartRequest, Watching
+from action_assistant.runner.start.kept_starts import graph_of, start_of, text_of
 from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.start_values import StartValues, Value, WrongValue, with_values
 
@@ -27,22 +27,6 @@ _MOST_BYTES: Final = 200_000  # of the values of all cells
 _PREFIX: Final = "repeat/"
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
-
-#: Why a repeat is closed: every cell was carried out; a person closed it; a Stop; a run that did not end
-#: true; a robot was lost; a baton changed; a person said that they looked; a robot moved after its end;
-#: a start was refused; the runner was started again.
-ClosedWhy: TypeAlias = Literal[
-    "complete",
-    "person",
-    "stop",
-    "run",
-    "lost",
-    "baton",
-    "looked",
-    "moves",
-    "refused",
-    "restart",
-]
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -196,24 +180,7 @@ def start_in(events: Iterable[Event]) -> StartRequest:
     """Return the start that a repeat carries out. Raise msgspec.DecodeError if it is not among the events
     or damaged."""
     kept = next((each.body for each in events if each.kind == StartKept.kind), b"")
-    return msgspec.json.decode(
-        bytes(msgspec.json.decode(kept, type=StartKept).start), type=StartRequest
-    )
-
-
-def kept(start: StartRequest) -> StartKept:
-    """Return the event that keeps a start, with its graph word for word."""
-    fields: dict[str, Any] = {
-        each.encode_name: getattr(start, each.name) for each in msgspec.structs.fields(start)
-    }
-    lacking = [
-        name
-        for name, value in fields.items()
-        if isinstance(value, msgspec.Raw) and not bytes(value)
-    ]
-    for name in lacking:
-        del fields[name]
-    return StartKept(msgspec.Raw(msgspec.json.encode(fields)))
+    return start_of(msgspec.json.decode(kept, type=StartKept).start)
 
 
 def repeat_id(request_id: str) -> str:
@@ -223,7 +190,7 @@ def repeat_id(request_id: str) -> str:
 
 def order_of(request: RepeatRequest) -> str:
     """Return the hash of all that a repeat orders."""
-    start = bytes(kept(request.start).start)
+    start = bytes(text_of(request.start))
     rest = [request.times, request.grid, request.seed, request.by_itself]
     return hashlib.sha256(start + msgspec.json.encode(rest)).hexdigest()
 
@@ -276,18 +243,10 @@ def named(request: RepeatRequest, cells: Sequence[StartValues]) -> str:
     """Return the name of the graph of a repeat after a look at the values of all cells. For workers. Raise
     BadInput for a value that an input cannot have, Conflict for another digest, NotUmrf or TooLarge for
     a graph that cannot be read."""
-    start = request.start
-    _, reading = read_sent(bytes(start.umrf))
-    found = digest(reading.graph)
-    if found != start.digest:
-        raise Conflict(
-            "The graph that was sent is not the one that was approved: its digest is "
-            f"{found[:12]}…, not {start.digest[:12]}…. Nothing was opened.",
-            where={"path": "/start/digest"},
-        )
+    graph = graph_of(request.start)
     for number, values in enumerate(cells, 1):
         try:
-            with_values(reading.graph, values)
+            with_values(graph, values)
         except WrongValue as wrong:
             place = next(
                 (
@@ -299,15 +258,4 @@ def named(request: RepeatRequest, cells: Sequence[StartValues]) -> str:
             )
             where: dict[str, object] = {"path": place, "cell": number}
             raise BadInput(str(wrong), where=where) from wrong
-    return reading.graph.name
-
-
-def group_of(start: StartRequest) -> GroupRequest:
-    """Return the request of a pre-flight of a start."""
-    names = {each.name for each in msgspec.structs.fields(GroupRequest)}
-    fields = {
-        each.name: getattr(start, each.name)
-        for each in msgspec.structs.fields(start)
-        if each.name in names
-    }
-    return GroupRequest(engines=(start.engine,), **fields)
+    return graph.name

@@ -17,13 +17,11 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused, Unavailable
 from action_assistant.kit.clock import ClockUs
-from action_assistant.kit.lru_cache import LruCache
-from action_assistant.runner.execution.conducted_steps import RUNNER
+from action_assistant.runner.execution.doubts import Closable, DoubtWatch
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.execution.start_pipeline import Started
 from action_assistant.runner.repeats.repeat import (
-    ClosedWhy,
     NextRequest,
     ReopenRequest,
     Repeat,
@@ -35,8 +33,6 @@ from action_assistant.runner.repeats.repeat import (
     StartKept,
     cells_of,
     follow,
-    group_of,
-    kept,
     named,
     order_of,
     repeat_id,
@@ -45,10 +41,12 @@ from action_assistant.runner.repeats.repeat import (
     stream_of,
 )
 from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.doubts import Doubt
 from action_assistant.runner.runs.events import Author, PartOfRepeat, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest, Watching
+from action_assistant.runner.start.kept_starts import group_of, text_of
 from action_assistant.runner.start.orders import engines_of, watched_in
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
@@ -64,38 +62,23 @@ _WAIT_S: Final = 5.0  # for that, before it is opened again
 _RESTARTED: Final = "The runner was started again. Nothing of a repeat goes on after that."
 
 
-class _Reason(msgspec.Struct, frozen=True):
-    """A fact that closes repeats. `run`: the run that it is about."""
-
-    why: ClosedWhy
-    text: str
-    by: Author | None = None
-    run: str = ""
-
-
-class _Record:
-    """A repeat in memory. `is_open`: cells may be started; `runs`: the run of each cell that was started;
-    `reasons`: how many facts that close it were seen, also while it was closed; `openings`: how often it
-    was opened in this process; `lives`, `holders`: the engine's process and the holder of the baton of
-    each robot when it was opened; `turn`: one start at a time; `storing`: one event at a time."""
+class _Record(Closable):
+    """A repeat in memory. `runs`: the run of each cell that was started; `openings`: how often it was
+    opened in this process; `turn`: one start at a time; `storing`: one event at a time."""
 
     def __init__(self, repeat: Repeat, start: StartRequest) -> None:
+        super().__init__(repeat.opened.robots)
         self.repeat = repeat
         self.start = start
-        self.is_open = False
         self.runs: dict[int, str] = {}
-        self.reasons = 0
         self.openings = 0
-        self.lives: dict[str, str] = {}
-        self.holders: dict[str, str] = {}
         self.turn = anyio.Lock()
         self.storing = anyio.Lock()
         self.news = anyio.Event()
 
-    @property
-    def robots(self) -> tuple[str, ...]:
-        """The robots that may move."""
-        return self.repeat.opened.robots
+    def owns(self, run: str) -> bool:
+        """Return whether a run is that of one of its cells."""
+        return run in self.runs.values()
 
     @property
     def next_cell(self) -> int | None:
@@ -103,9 +86,9 @@ class _Record:
         cells = range(1, len(self.repeat.opened.cells) + 1)
         return next((cell for cell in cells if cell not in self.runs), None)
 
-    def has_changed(self, reasons: int) -> bool:
-        """Return whether it is open, or more than these facts that close it were seen."""
-        return self.is_open or self.reasons != reasons
+    def has_changed(self, doubts: int) -> bool:
+        """Return whether it is open, or more than these doubts were seen."""
+        return self.is_open or self.doubts != doubts
 
     def tell(self) -> None:
         """Wake up who waits for a change."""
@@ -131,11 +114,9 @@ class Repeats:
         self._tasks = tasks
         self._run_in_worker = run_in_worker
         self._records: dict[str, _Record] = {}
-        self._known: LruCache[str, bool] = LruCache(2000)  # facts about runs, each seen once
         self._opening = anyio.Lock()
+        self._doubts = DoubtWatch[_Record](control, self._records.values, self._close)
         control.watch(self._run_changed)
-        control.watch_robots(self._robots_changed)
-        control.watch_stops(self._stopped)
 
     @classmethod
     @asynccontextmanager
@@ -264,13 +245,13 @@ class Repeats:
         record = _Record(Repeat(opened=opened), start)
         self._keep(record)
         try:
-            drafts = [draft_of(opened, author.id), draft_of(kept(start), author.id)]
+            drafts = [draft_of(opened, author.id), draft_of(StartKept(text_of(start)), author.id)]
             await self._journal.append(stream_of(opened.repeat), drafts, expected=0)
         except BaseException:
             del self._records[opened.repeat]
             raise
-        if record.reasons:
-            self._close(record, _Reason("stop", "Something closed it while it was being opened."))
+        if record.doubts:
+            self._close(record, Doubt("stop", "Something closed it while it was being opened."))
         else:
             self._begin(record, author, identity)
         return record.repeat, True
@@ -284,7 +265,7 @@ class Repeats:
         record = await self._loaded(id_)
         if record.is_open:
             raise Conflict("This repeat is open.")
-        cell, before = record.next_cell, record.reasons
+        cell, before = record.next_cell, record.doubts
         if asked.closings != record.repeat.closings:
             closed = record.repeat.closed
             text = f"It was closed again meanwhile. {closed.text if closed else ''}"
@@ -306,7 +287,7 @@ class Repeats:
                     return record.repeat
         if not record.has_changed(before):
             raise Unavailable("It could not be stored that the repeat was closed. Try again.")
-        reason = _Reason("stop", "Something closed it while it was being opened again.")
+        reason = Doubt("stop", "Something closed it while it was being opened again.")
         self._close(record, reason, is_stored=True)
         raise Conflict(reason.text)
 
@@ -325,10 +306,8 @@ class Repeats:
 
     def _begin(self, record: _Record, author: Author, identity: Identity) -> None:
         """Let cells of a repeat be started, and remember how its robots are now."""
-        record.is_open = True
+        self._doubts.begin(record)
         record.openings += 1
-        record.lives = {name: self._life(name) for name in record.robots}
-        record.holders = {name: self._holder(name) for name in record.robots}
         record.tell()
         if record.repeat.opened.by_itself:
             self._tasks.start_soon(self._go_on, record, author, identity)
@@ -399,12 +378,12 @@ class Repeats:
                 if (record.is_open, record.openings, record.next_cell) != (True, opening, cell):
                     continue
                 if why := self._why_not(identity):
-                    self._close(record, _Reason("refused", why))
+                    self._close(record, Doubt("refused", why))
                     return
                 try:
                     await self._start(record, cell, {}, author, identity)
                 except Refused as refused:
-                    self._close(record, _Reason("refused", refused.detail))
+                    self._close(record, Doubt("refused", refused.detail))
 
     def _why_not(self, identity: Identity) -> str:
         who = identity.person.name or "The person who opened it"
@@ -423,16 +402,10 @@ class Repeats:
         if record is None:
             return await self.find(id_)
         who = author.name or "Somebody"
-        self._meet(record, _Reason("person", f"{who} stopped repeating.", author))
+        self._doubts.meet(record, Doubt("person", f"{who} stopped repeating.", author))
         return record.repeat
 
-    def _meet(self, record: _Record, reason: _Reason) -> None:
-        """Note a fact that closes a repeat."""
-        record.reasons += 1
-        if record.is_open:
-            self._close(record, reason)
-
-    def _close(self, record: _Record, reason: _Reason, *, is_stored: bool = False) -> None:
+    def _close(self, record: _Record, reason: Doubt, *, is_stored: bool = False) -> None:
         """Close a repeat in this step, and store that. `is_stored`: its stream says that it is open,
         although it is not."""
         if not record.is_open and record.repeat.closed is not None and not is_stored:
@@ -462,64 +435,19 @@ class Repeats:
                 except Refused:  # it is closed in any case, and after a restart, too
                     await anyio.sleep(_STORE_S)
 
-    def _stopped(self, author: Author, robot: str, run: str) -> None:
-        """Close the repeats that a Stop concerns: all, those of a robot, or that of a run."""
-        who = author.name or "Somebody"
-        for record in tuple(self._records.values()):
-            if robot in record.robots if robot else not run or run in record.runs.values():
-                what = f" of {robot}" if robot else "" if run else " of everything"
-                text = f"{who} pressed Stop{what}."
-                if author.id == RUNNER.id:
-                    text = f"{robot or 'A run of it'} was stopped by {who}."
-                self._meet(record, _Reason("stop", text, author, run))
-
     def _run_changed(self, opened: OpenRun) -> None:
         run = opened.run
-        if opened.is_led or not self._records:
+        if opened.is_led:
             return
         own = self._records.get(run.repeat.id) if run.repeat is not None else None
         if own is not None and run.repeat is not None:
             own.runs.setdefault(run.repeat.cell, run.id)
-        for reason in _reasons_in(run):
-            key = f"{run.id} {reason.why}"
-            if self._known.get(key):
-                continue
-            self._known.put(key, True)
-            for record in tuple(self._records.values()):
-                if record is own or not set(run.robots).isdisjoint(record.robots):
-                    self._meet(record, reason)
+        self._doubts.look_at(run)
         if own is not None and run.end is not None:
             own.tell()
             if own.is_open and own.next_cell is None:
                 text = "Every run was carried out, and ended true."
-                self._close(own, _Reason("complete", text, run=run.id))
-
-    def _robots_changed(self) -> None:
-        for record in tuple(self._records.values()):
-            for robot in record.robots if record.is_open else ():
-                if (lost := self._why_lost(record, robot)) or (
-                    self._holder(robot) != record.holders[robot]
-                ):
-                    text = lost or f"The baton of {robot} changed hands."
-                    self._meet(record, _Reason("lost" if lost else "baton", text))
-                    break
-
-    def _why_lost(self, record: _Record, robot: str) -> str:
-        engine, life = self._control.robots.link(robot), record.lives[robot]
-        if engine is None:
-            return f"There is no link to {robot} any more."
-        if engine.state == "gone":
-            return f"{robot} was lost. {engine.why}".strip()
-        now = self._life(robot)
-        return f"The engine of {robot} was started again." if life and now not in {"", life} else ""
-
-    def _life(self, robot: str) -> str:
-        engine = self._control.robots.link(robot)
-        return "" if engine is None else engine.standing.incarnation
-
-    def _holder(self, robot: str) -> str:
-        held = self._control.rights.of(robot).holder
-        return "" if held is None else held.person.id
+                self._close(own, Doubt("complete", text, run=run.id))
 
     # --- memory -------------------------------------------------------------------------------
 
@@ -581,22 +509,3 @@ def _why_closed(repeat: Repeat) -> Conflict:
     closed = repeat.closed
     text = "" if closed is None else f" {closed.text}"
     return Conflict(f"This repeat is closed.{text}", where={"closings": repeat.closings})
-
-
-def _reasons_in(run: Run) -> Iterator[_Reason]:
-    """Yield the facts about a run that close the repeats of its robots."""
-    number = f"Run {run.number}"
-    if run.desired == "stopped":
-        who = (run.stopped_by.name if run.stopped_by is not None else "") or "Somebody"
-        yield _Reason("stop", f"{who} pressed Stop of run {run.number}.", run.stopped_by, run.id)
-    if run.lost:
-        yield _Reason("lost", f"{number} was lost. {run.lost}", run=run.id)
-    if run.at_rest is not None:
-        who = (run.at_rest.by.name if run.at_rest.by is not None else "") or "Somebody"
-        text = f"{who} looked at the robot after run {run.number}."
-        yield _Reason("looked", text, run.at_rest.by, run.id)
-    if run.moves_again_at is not None:
-        yield _Reason("moves", f"{number} moved again after its end.", run=run.id)
-    if run.end is not None and not run.ended_true:
-        result = f", {run.result.removeprefix('on_')}" if run.result else ""
-        yield _Reason("run", f"{number} did not end true: {run.end}{result}.", run=run.id)

@@ -9,7 +9,8 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 
 from action_assistant.runner.analysis.exports import plain_cell
-from action_assistant.runner.repeats.repeat import Axis, ClosedWhy, Repeat
+from action_assistant.runner.repeats.repeat import Axis, Repeat
+from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sight import RunGraphs
 from action_assistant.runner.runs.views import Listed, time

@@ -1,0 +1,56 @@
+"""Starts that are kept as they were sent, and carried out later. Pure."""
+
+from typing import Any
+
+import msgspec
+
+from action_assistant.errors import Conflict
+from action_assistant.runner.runs.sent_graphs import read_sent
+from action_assistant.runner.start.admission import GroupRequest, StartRequest
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.model import Graph
+
+
+def text_of(start: StartRequest) -> msgspec.Raw:
+    """Return a start as JSON, with its graph word for word."""
+    fields: dict[str, Any] = {
+        each.encode_name: getattr(start, each.name) for each in msgspec.structs.fields(start)
+    }
+    lacking = [
+        name
+        for name, value in fields.items()
+        if isinstance(value, msgspec.Raw) and not bytes(value)
+    ]
+    for name in lacking:
+        del fields[name]
+    return msgspec.Raw(msgspec.json.encode(fields))
+
+
+def start_of(text: msgspec.Raw) -> StartRequest:
+    """Return the start in a text of `text_of`. Raise msgspec.DecodeError for a damaged one."""
+    return msgspec.json.decode(bytes(text), type=StartRequest)
+
+
+def graph_of(start: StartRequest) -> Graph:
+    """Return the graph of a start. For workers. Raise Conflict for another digest, NotUmrf or TooLarge
+    for a graph that cannot be read."""
+    _, reading = read_sent(bytes(start.umrf))
+    found = digest(reading.graph)
+    if found != start.digest:
+        raise Conflict(
+            "The graph that was sent is not the one that was approved: its digest is "
+            f"{found[:12]}…, not {start.digest[:12]}…. Nothing was opened.",
+            where={"path": "/start/digest"},
+        )
+    return reading.graph
+
+
+def group_of(start: StartRequest) -> GroupRequest:
+    """Return the request of a pre-flight of a start."""
+    names = {each.name for each in msgspec.structs.fields(GroupRequest)}
+    fields = {
+        each.name: getattr(start, each.name)
+        for each in msgspec.structs.fields(start)
+        if each.name in names
+    }
+    return GroupRequest(engines=(start.engine,), **fields)
