@@ -93,6 +93,11 @@ PARTS: Final[dict[str, Part]] = {
         {"SOAK_CUTS": "1000"},
         ("tests/journal/test_postgres.py", "-k", "cuts_anywhere"),
     ),
+    "overtaken": Part(
+        "20 times three writers on one Postgres without its lock, whose connections are cut",
+        {"SOAK_OVERTAKEN": "60", "SOAK_SEEDS": "20"},
+        ("tests/journal/test_overtaken.py", "-k", "three_writers"),
+    ),
     "flips": Part(
         "10,000 flipped bytes of a log",
         {"SOAK_FLIPS": "10000"},

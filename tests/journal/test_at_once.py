@@ -5,7 +5,7 @@ import math
 import sqlite3
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,12 +34,12 @@ class Watched:
         self.broken: list[Exception] = []
 
     def store(self, original: Any) -> Any:
-        def stored(session: SqliteSession, events: Sequence[tuple[Event, bytes]]) -> None:
+        def stored(session: SqliteSession, *values: Any) -> None:
             self.here.append(threading.current_thread() is threading.main_thread())
             time.sleep(self.delay)
             if self.broken:
                 raise self.broken.pop()
-            original(session, events)
+            original(session, *values)
 
         return stored
 

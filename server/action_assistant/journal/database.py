@@ -2,12 +2,13 @@
 
 import errno
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final, Literal, Protocol, TypeAlias, TypeVar
 
 from sqlalchemy import Connection
 from sqlalchemy.exc import DBAPIError
 
+from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Event
 
 T = TypeVar("T")
@@ -22,6 +23,18 @@ Before: TypeAlias = Callable[[Connection, Branch, str], object]
 
 def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
     """Do nothing: make no copy before an upgrade, since the database is a copy itself, or new."""
+
+
+class Overtaken(Exception):
+    """Another process has written to this database, so what this one knows of its streams is old.
+    `streams`: those of the statement that was refused; at least one of them has moved, or another
+    event has the position of one of their events."""
+
+    def __init__(self, streams: Iterable[str]) -> None:
+        self.streams: Final = tuple(streams)
+        super().__init__(
+            "the log has another end than this process has read, as when another process writes to it"
+        )
 
 
 class WriterSession(Protocol):
@@ -42,9 +55,11 @@ class WriterSession(Protocol):
     def say(self, command: str) -> None:
         """Execute a command of SQL without a result, such as COMMIT or SAVEPOINT."""
 
-    def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
+    def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
         """Write events, each with its link of the hash chain, and the new ends of their streams:
-        all or nothing. If no transaction is open, this is one of its own, which is committed."""
+        all or nothing. If no transaction is open, this is one of its own, which is committed.
+        `known`: the ends of their streams in the database, as the writer knows them. Raise Overtaken
+        if another process has moved one of them; nothing is written then."""
 
     def close(self) -> None:
         """Close the connection, whatever its state is; an open transaction is rolled back."""

@@ -5,7 +5,7 @@ import hashlib
 import os
 import secrets
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
@@ -15,7 +15,8 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_en
 from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Before, Branch, cause_of, no_copy
+from action_assistant.journal.chain import Head
+from action_assistant.journal.database import Before, Branch, Overtaken, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import kept_as_it_is, upgrade_to
 from action_assistant.schema.editor_tables import editor_event
@@ -39,16 +40,31 @@ _SETTINGS: Final = {
     "server_encoding": ({"UTF8"}, "it cannot hold every text"),
     _READ_ONLY: ({"off"}, "it is a read-only copy"),
 }
-#: One statement that inserts the events and updates the counter of each stream.
+#: One statement that inserts events if each of their streams still ends where the writer read its end, and
+#: moves those ends. If one does not, the column `position`, which is never null, would become null: the
+#: server refuses the whole statement, and nothing is written (decision 151).
 _STORE: Final = """
-WITH ends AS (
+WITH known AS (
+    SELECT * FROM unnest($9::text[], $10::bigint[], $11::bytea[], $12::bigint[], $13::bytea[])
+        AS k (stream, seq, chain, old_seq, old_chain)
+), begun AS (
     INSERT INTO head (stream, seq, chain)
-    SELECT * FROM unnest($9::text[], $10::bigint[], $11::bytea[])
-    ON CONFLICT (stream) DO UPDATE SET seq = excluded.seq, chain = excluded.chain
+    SELECT stream, seq, chain FROM known WHERE old_seq = 0 ORDER BY stream
+    ON CONFLICT (stream) DO NOTHING
+    RETURNING stream
+), moved AS (
+    UPDATE head SET seq = k.seq, chain = k.chain FROM known k
+    WHERE head.stream = k.stream AND (head.seq, head.chain) = (k.old_seq, k.old_chain)
+    RETURNING head.stream
 )
 INSERT INTO event (stream, seq, kind, author, at, body, position, chain)
-SELECT * FROM unnest($1::text[], $2::bigint[], $3::text[], $4::text[], $5::bigint[],
-                     $6::bytea[], $7::bigint[], $8::bytea[])
+SELECT e.stream, e.seq, e.kind, e.author, e.at, e.body,
+       CASE WHEN (SELECT count(*) FROM begun) + (SELECT count(*) FROM moved) = $14
+            THEN e.position END,
+       e.chain
+FROM unnest($1::text[], $2::bigint[], $3::text[], $4::text[], $5::bigint[],
+            $6::bytea[], $7::bigint[], $8::bytea[])
+    AS e (stream, seq, kind, author, at, body, position, chain)
 """
 _END_OLD: Final = """
 SELECT pg_terminate_backend(pid) FROM pg_stat_activity
@@ -98,14 +114,32 @@ class PostgresSession:
         """Execute a command of SQL without a result."""
         await_only(self._raw.execute(command))
 
-    def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
+    def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
         """Write events, each with its link of the hash chain, and the new end of each stream (the
-        number and link of its last event). If no transaction is open, this is one of its own."""
+        number and link of its last event). If no transaction is open, this is one of its own. Raise
+        Overtaken if a stream does not end where `known` says, or a position is taken."""
         columns = [(e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position) for e, _ in events]
         values = [list(column) for column in zip(*columns, strict=True)]
-        heads = {event.stream: (event.seq, chain) for event, chain in events}
-        ends = [list(heads), [seq for seq, _ in heads.values()], [end for _, end in heads.values()]]
-        await_only(self._raw.execute(_STORE, *values, [chain for _, chain in events], *ends))
+        heads = {event.stream: Head(event.seq, chain) for event, chain in events}
+        old = [known[stream] for stream in heads]
+        ends = [[end.seq for end in ends] for ends in (heads.values(), old)]
+        links = [[end.chain for end in ends] for ends in (heads.values(), old)]
+        try:
+            await_only(
+                self._raw.execute(
+                    _STORE,
+                    *values,
+                    [chain for _, chain in events],
+                    list(heads),
+                    ends[0],
+                    links[0],
+                    ends[1],
+                    links[1],
+                    len(heads),
+                )
+            )
+        except (asyncpg.NotNullViolationError, asyncpg.UniqueViolationError) as error:
+            raise Overtaken(heads) from error
 
     def close(self) -> None:
         """Close the connection at once; an uncommitted transaction is rolled back."""

@@ -7,7 +7,7 @@ import shutil
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from functools import lru_cache
@@ -27,7 +27,7 @@ from sqlalchemy.exc import (
 )
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.chain import Damage, Inspector
+from action_assistant.journal.chain import Damage, Head, Inspector
 from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.lock import own as own
@@ -112,9 +112,11 @@ class SqliteSession:
         if command == "COMMIT":
             self._checkpoints.committed()
 
-    def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
+    def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
         """Write events, each with its link of the hash chain. In the same transaction a trigger
-        writes the new ends of their streams."""
+        writes the new ends of their streams. The lock of the file keeps other writers out, so
+        `known`, the ends as this process read them, is right."""
+        del known
         rows = [
             (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
             for e, link in events

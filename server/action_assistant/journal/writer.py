@@ -14,7 +14,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.commit_metrics import CommitMetrics
-from action_assistant.journal.database import Database, WriterSession, cause_of
+from action_assistant.journal.database import Database, Overtaken, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
 from action_assistant.kit.clock import utc_us
 from action_assistant.schema import editor_tables
@@ -30,6 +30,7 @@ _TOGETHER: Final = 1000  # jobs after which no others join a transaction
 _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job joins
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
 _AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
+_RUNS: Final = 5  # of the same jobs, where another process goes on writing to their streams
 _LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.position), 0))
 
 
@@ -66,6 +67,7 @@ class Transaction:
         self._session = session
         self._position: int = session.connection.execute(_LAST).scalar_one()
         self._heads: dict[str, Head] = {}
+        self._stored: dict[str, Head] = {}  # ends of the same streams in the database
         self._before: dict[str, Head] = {}  # ends of streams before the job that is under way
         self._gathered: list[tuple[Event, bytes]] = []  # by earlier jobs
         self._own: list[tuple[Event, bytes]] = []  # by this job
@@ -82,6 +84,7 @@ class Transaction:
         self.committing = False
         if len(self._heads) > _KNOWN:
             self._heads.clear()
+            self._stored.clear()
 
     @property
     def connection(self) -> Connection:
@@ -125,7 +128,7 @@ class Transaction:
 
     def attempt(self, job: Job[Any], database: Database) -> Outcome:
         """Run one job and return its outcome. An error of the job is in the outcome; only an error
-        that prevents storing anything at all is raised."""
+        that prevents storing anything at all is raised, and Overtaken."""
         position = self._position
         self._before.clear()
         try:
@@ -133,6 +136,8 @@ class Transaction:
             if self._entered:
                 self._store(self._own)
                 self._session.say("RELEASE SAVEPOINT job")
+        except Overtaken:
+            raise
         except Exception as error:  # of the job alone: its caller gets it
             if isinstance(error, database.faults) and (self._storing or database.lost(error)):
                 raise
@@ -180,8 +185,10 @@ class Transaction:
         if events:
             self._storing = True
             self.last = events[-1]
-            self._session.store(events)
+            self._session.store(events, self._stored)
             self._storing = False
+            for event, chain in events:
+                self._stored[event.stream] = Head(event.seq, chain)
 
     def _head(self, stream: str) -> Head:
         head = self._heads.get(stream)
@@ -190,6 +197,7 @@ class Transaction:
             found = select(table.c.seq, table.c.chain).where(table.c.stream == stream)
             row = self._session.connection.execute(found).first()
             head = self._heads[stream] = Head(*row) if row is not None else NOTHING
+            self._stored[stream] = head
         return head
 
 
@@ -277,11 +285,23 @@ class Writer:
         transaction: Transaction | None = None
         self.metrics.begins()
         try:
-            session, transaction = self._connected()
-            session.run(lambda: self._together(transaction, jobs, done))
+            for run in range(_RUNS):
+                session, transaction = self._connected()
+                try:
+                    session.run(partial(self._together, transaction, jobs, done))
+                    break
+                except Overtaken as error:
+                    # Whoever has the lock is the writer: take it again, and read all ends again. A
+                    # job that was made for another end is refused then, alone.
+                    log.error("%s: %s (%s).", self._database.name, error, error.streams[0])
+                    self._disconnect()
+                    transaction = None  # the server refused it whole
+                    if run == _RUNS - 1:
+                        raise
+                    done.clear()
         except Exception as error:  # the thread lives on, and all callers get the error
             # After a failed commit it is unknown what the disk holds: read it again.
-            ours = not isinstance(error, self._database.faults)
+            ours = not isinstance(error, (Overtaken, *self._database.faults))
             why = cause_of(error)
             is_known = not ours and why == self.metrics.failing  # said once, until it works again
             level = logging.DEBUG if is_known else logging.ERROR
