@@ -296,11 +296,32 @@ test("a run is repeated with the newest version of its graph", async () => {
   );
 });
 
+test("the list is walked by keys, and the run before is one click away", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs?graph=${graph}`);
+  await expect(page.getByRole("rowheader", { name: "today" })).toBeVisible();
+  const runs = page.getByRole("link", { name: /^Run \d+/ });
+  await runs.last().waitFor();
+  await page.keyboard.press("j");
+  await page.keyboard.press("j");
+  await expect(runs.nth(1)).toBeFocused();
+  await page.keyboard.press("k");
+  await expect(runs.first()).toBeFocused();
+  const failed = page.getByRole("row").filter({ hasText: `Run ${bad.number}` });
+  await expect(failed.getByRole("img", { name: /^Course: true, error/ })).toBeVisible();
+  await failed.getByRole("link", { name: `Compare with ${good.number}` }).click();
+  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await page.goto(`${product.url}/runs/compare?b=${bad.id}`);
+  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await page.getByRole("link", { name: "Another run" }).click();
+  await expect(page.getByText("Compare with which run?")).toBeVisible();
+});
+
 test("the rarer filters narrow the list, and what was stored can be read as it is", async () => {
   const { page } = ada;
   const rows = page.getByRole("row").filter({ has: page.getByRole("checkbox") });
   await page.goto(`${product.url}/runs`);
-  await page.getByRole("button", { name: "More filters" }).click();
+  await page.getByRole("button", { name: "Filters" }).click();
   await page.getByRole("combobox", { name: "Graph" }).click();
   await page.getByRole("option", { name: "handing_over" }).click();
   await expect(rows).toHaveCount(1);

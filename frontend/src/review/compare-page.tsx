@@ -2,7 +2,7 @@
 import { Button, Select, Skeleton, Tabs } from "@mantine/core";
 import { IconAlertTriangle, IconArrowsDiff } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { type ReactNode, useState } from "react";
+import { type ReactNode, useEffect, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
 import { engineWords } from "../api/led-runs";
@@ -205,8 +205,11 @@ function Found({ runner, found }: { runner: string | undefined; found: Compariso
   );
 }
 
-/** Chooses the run to compare with, among those of the same graph. */
-function Choose({ runner, b }: { runner: string; b: string }) {
+/**
+ * Compares with the run of the same graph before this one; where there is none, or another is wanted,
+ * a person chooses it.
+ */
+function Choose({ runner, b, asked }: { runner: string; b: string; asked: boolean }) {
   const [, go] = useLocation();
   const second = useQuery({
     queryKey: ["runs", "one", b],
@@ -218,11 +221,31 @@ function Choose({ runner, b }: { runner: string; b: string }) {
     queryFn: ({ signal }) => listRuns(runner, { ...NO_FILTER, graph }, null, 200, signal),
     enabled: graph !== "",
   });
+  const before = useQuery({
+    queryKey: ["runs", "before", graph, b],
+    queryFn: ({ signal }) => listRuns(runner, { ...NO_FILTER, graph }, b, 1, signal),
+    enabled: graph !== "" && !asked,
+  });
+  const first = before.data?.[0]?.id;
+  useEffect(() => {
+    if (first === undefined || asked) return;
+    go(`/runs/compare?${new URLSearchParams({ a: first, b })}`, { replace: true });
+  }, [first, asked, b, go]);
+  if (second.isError)
+    return (
+      <Empty icon={<IconAlertTriangle size={22} />} title="This run cannot be compared">
+        {errorText(second.error)}
+      </Empty>
+    );
+  if (!asked && (before.isPending || first !== undefined)) return <Comparing />;
   const choices = (others.data ?? [])
     .filter((run) => run.id !== b)
     .map((run) => ({ value: run.id, label: `Run ${run.number} · ${runEndText(run)}` }));
   return (
-    <Empty icon={<IconArrowsDiff size={22} />} title="Compare with which run?">
+    <Empty
+      icon={<IconArrowsDiff size={22} />}
+      title={asked ? "Compare with which run?" : "There is no run before it: compare with which?"}
+    >
       <Select
         aria-label="Run to compare with"
         placeholder={
@@ -236,6 +259,15 @@ function Choose({ runner, b }: { runner: string; b: string }) {
   );
 }
 
+function Comparing() {
+  return (
+    <div className={style.inner} aria-busy="true">
+      <Skeleton height={60} mb={12} />
+      <Skeleton height={280} />
+    </div>
+  );
+}
+
 export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
   const query = new URLSearchParams(useSearch());
   const [a, b] = [query.get("a") ?? "", query.get("b") ?? ""];
@@ -246,23 +278,29 @@ export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode })
       {bar({
         crumbs: [{ label: "Runs", to: "/runs" }, { label: "Compare" }],
         actions: a !== "" && b !== "" && (
-          <Button
-            component={Link}
-            variant="default"
-            to={`/runs/compare?${new URLSearchParams({ a: b, b: a })}`}
-          >
-            Swap
-          </Button>
+          <>
+            <Button
+              component={Link}
+              variant="default"
+              to={`/runs/compare?${new URLSearchParams({ b, choose: "true" })}`}
+            >
+              Another run
+            </Button>
+            <Button
+              component={Link}
+              variant="default"
+              to={`/runs/compare?${new URLSearchParams({ a: b, b: a })}`}
+            >
+              Swap
+            </Button>
+          </>
         ),
       })}
       <main className="page">
-        {a === "" && runner !== undefined && b !== "" && <Choose runner={runner} b={b} />}
-        {found.isLoading && (
-          <div className={style.inner} aria-busy="true">
-            <Skeleton height={60} mb={12} />
-            <Skeleton height={280} />
-          </div>
+        {a === "" && runner !== undefined && b !== "" && (
+          <Choose key={b} runner={runner} b={b} asked={query.has("choose")} />
         )}
+        {found.isLoading && <Comparing />}
         {found.isError && (
           <Empty icon={<IconAlertTriangle size={22} />} title="These runs cannot be compared">
             {errorText(found.error)}

@@ -1,13 +1,16 @@
 /** Filters of the list of runs: search, choices, and filters that a person saved on this device. */
-import { ActionIcon, Button, Menu, Popover, Select, Stack, TextInput } from "@mantine/core";
-import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
 import {
-  IconAdjustmentsHorizontal,
-  IconFilter,
-  IconPin,
-  IconSearch,
-  IconTrash,
-} from "@tabler/icons-react";
+  ActionIcon,
+  Button,
+  Checkbox,
+  Menu,
+  Popover,
+  Select,
+  Stack,
+  TextInput,
+} from "@mantine/core";
+import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
+import { IconAdjustmentsHorizontal, IconFilter, IconSearch, IconTrash } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { useGraphNames } from "../api/graph-list";
 import { useVersions, versionName } from "../api/graphs";
@@ -70,7 +73,9 @@ function filterWords(filter: RunFilter): string {
   return words.filter(Boolean).join(" ") || "All runs";
 }
 
-function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) {
+type FilterProps = Pick<Props, "filter" | "onChange">;
+
+function SavedFilters({ filter, onChange }: FilterProps) {
   const [saved, setSaved] = useLocalStorage<SavedFilter[]>({
     key: "aa.run-filters",
     defaultValue: [],
@@ -80,8 +85,9 @@ function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) 
   return (
     <Menu position="bottom-end" withinPortal>
       <Menu.Target>
-        <Button variant="default" leftSection={<IconFilter size={15} aria-hidden />}>
-          Saved
+        <Button variant="default" aria-label="Saved" className={style.saved ?? ""}>
+          <IconFilter size={15} aria-hidden />
+          <span className={style.wide}>Saved</span>
         </Button>
       </Menu.Target>
       <Menu.Dropdown>
@@ -113,13 +119,28 @@ function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) 
   );
 }
 
+function StateFilter({ filter, onChange }: FilterProps) {
+  return (
+    <Segments
+      size="xs"
+      label="State"
+      data={ENDINGS.map(({ value, label }) => ({ value, label }))}
+      value={endingOf(filter)}
+      onChange={(value) => {
+        const chosen = ENDINGS.find((each) => each.value === value);
+        if (chosen) onChange({ ...filter, ...chosen.asks });
+      }}
+    />
+  );
+}
+
+/** The search and the state; all other filters are behind one button, and on a phone the state, too. */
 export function RunFilters({ runner, filter, onChange, engines }: Props) {
-  const labels = useLabels(runner).data ?? [];
   const [text, setText] = useState(filter.text);
   useEffect(() => setText(filter.text), [filter.text]);
   const search = useDebouncedCallback((next: string) => onChange({ ...filter, text: next }), 250);
   return (
-    <div className="row-wrap gap-50">
+    <div className={style.filters}>
       <TextInput
         aria-label="Search runs"
         placeholder="Graph, person, number or message"
@@ -131,59 +152,19 @@ export function RunFilters({ runner, filter, onChange, engines }: Props) {
         }}
         className={style.search ?? ""}
       />
-      <Segments
-        size="xs"
-        label="State"
-        data={ENDINGS.map(({ value, label }) => ({ value, label }))}
-        value={endingOf(filter)}
-        onChange={(value) => {
-          const chosen = ENDINGS.find((each) => each.value === value);
-          if (chosen) onChange({ ...filter, ...chosen.asks });
-        }}
-      />
-      <Select
-        aria-label="Robot"
-        placeholder="Any robot"
-        data={engines.map((value) => ({
-          value,
-          label: value === CONDUCTED ? "led step by step" : value,
-        }))}
-        clearable
-        value={filter.robot || null}
-        onChange={(robot) => onChange({ ...filter, robot: robot ?? "" })}
-        className={style.choice ?? ""}
-      />
-      <Select
-        aria-label="Label"
-        placeholder="Any label"
-        data={labels}
-        clearable
-        searchable
-        value={filter.label || null}
-        onChange={(label) => onChange({ ...filter, label: label ?? "" })}
-        className={style.choice ?? ""}
-      />
-      <ActionIcon
-        variant={filter.pinned ? "filled" : "default"}
-        size={34}
-        aria-label="Only pinned runs"
-        aria-pressed={filter.pinned}
-        onClick={() => onChange({ ...filter, pinned: !filter.pinned })}
-      >
-        <IconPin size={16} aria-hidden />
-      </ActionIcon>
-      <MoreRunFilters filter={filter} onChange={onChange} />
+      <div className={style.wide}>
+        <StateFilter filter={filter} onChange={onChange} />
+      </div>
+      <MoreRunFilters {...{ runner, filter, onChange, engines }} />
       <SavedFilters filter={filter} onChange={onChange} />
     </div>
   );
 }
 
-interface MoreRunFiltersProps {
-  filter: RunFilter;
-  onChange: (filter: RunFilter) => void;
-}
-
-const RARE = ["graph", "version", "person", "since", "until"] as const;
+/** Filters behind the button. */
+const RARE = [
+  ...(["robot", "label", "pinned", "graph", "version", "person", "since", "until"] as const),
+];
 
 /** Midnight here, as the runner takes times; empty for none. */
 function momentOf(date: string, after: "begin" | "end"): string {
@@ -201,7 +182,7 @@ function dateOf(moment: string): string {
   return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`;
 }
 
-function Person({ filter, onChange }: MoreRunFiltersProps) {
+function Person({ filter, onChange }: FilterProps) {
   const [text, setText] = useState(filter.person);
   useEffect(() => setText(filter.person), [filter.person]);
   const take = () => text.trim() !== filter.person && onChange({ ...filter, person: text.trim() });
@@ -217,13 +198,44 @@ function Person({ filter, onChange }: MoreRunFiltersProps) {
   );
 }
 
-function Fields({ filter, onChange }: MoreRunFiltersProps) {
+function Fields({ runner, filter, onChange, engines }: Props) {
+  const labels = useLabels(runner).data ?? [];
   const graphs = useGraphNames().data ?? [];
   const versions = useVersions(filter.graph).data ?? [];
   const known = graphs.map(({ id, name }) => ({ value: id, label: name }));
   const strange = filter.graph !== "" && known.every(({ value }) => value !== filter.graph);
   return (
-    <Stack gap="xs" tabIndex={-1} data-autofocus aria-label="More filters">
+    <Stack gap="xs" tabIndex={-1} data-autofocus role="group" aria-label="Filters">
+      <div className={style.narrow}>
+        <StateFilter filter={filter} onChange={onChange} />
+      </div>
+      <Select
+        label="Robot"
+        placeholder="Any robot"
+        data={engines.map((value) => ({
+          value,
+          label: value === CONDUCTED ? "led step by step" : value,
+        }))}
+        clearable
+        comboboxProps={{ withinPortal: false }}
+        value={filter.robot || null}
+        onChange={(robot) => onChange({ ...filter, robot: robot ?? "" })}
+      />
+      <Select
+        label="Label"
+        placeholder="Any label"
+        data={labels}
+        clearable
+        searchable
+        comboboxProps={{ withinPortal: false }}
+        value={filter.label || null}
+        onChange={(label) => onChange({ ...filter, label: label ?? "" })}
+      />
+      <Checkbox
+        label="Only pinned runs"
+        checked={filter.pinned}
+        onChange={(event) => onChange({ ...filter, pinned: event.currentTarget.checked })}
+      />
       <Select
         label="Graph"
         placeholder="Any graph"
@@ -265,20 +277,24 @@ function Fields({ filter, onChange }: MoreRunFiltersProps) {
   );
 }
 
-function MoreRunFilters(props: MoreRunFiltersProps) {
-  const set = RARE.filter((name) => props.filter[name] !== "").length;
+function MoreRunFilters(props: Props) {
+  const { filter } = props;
+  const rare = RARE.filter((name) => filter[name] !== NO_FILTER[name]).length;
+  const ending = endingOf(filter) === "all" ? 0 : 1;
   return (
-    <Popover position="bottom-end" width={260} withinPortal trapFocus>
+    <Popover position="bottom-end" width={280} withinPortal trapFocus>
       <Popover.Target>
         <Button
-          variant={set > 0 ? "light" : "default"}
+          variant={rare > 0 ? "light" : "default"}
           leftSection={<IconAdjustmentsHorizontal size={15} aria-hidden />}
-          aria-label={set > 0 ? `More filters, ${set} set` : "More filters"}
+          aria-label={rare + ending > 0 ? `Filters, ${rare + ending} set` : "Filters"}
         >
-          More{set > 0 && ` · ${set}`}
+          Filters
+          {rare > 0 && <span className={style.wide}> · {rare}</span>}
+          {rare + ending > 0 && <span className={style.narrow}> · {rare + ending}</span>}
         </Button>
       </Popover.Target>
-      <Popover.Dropdown>
+      <Popover.Dropdown className="overflow-y-auto" mah="calc(100dvh - 12rem)">
         <Fields {...props} />
       </Popover.Dropdown>
     </Popover>

@@ -1,22 +1,20 @@
 /** List of runs, newest first: who started them, when, how long they took and how they ended. */
 
-import { ActionIcon, Button, Checkbox, Skeleton } from "@mantine/core";
+import { Button, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
   IconAlertTriangle,
   IconArrowsDiff,
   IconChartBar,
   IconHistory,
-  IconPinFilled,
   IconSearch,
 } from "@tabler/icons-react";
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
-import { type MouseEvent, useCallback, useMemo, useState } from "react";
+import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
 import { CONDUCTED, enginesOf } from "../api/led-runs";
 import { useLive } from "../api/page-link";
-import { useCurrentName } from "../api/people";
 import {
   filterOf,
   importExamples,
@@ -25,24 +23,16 @@ import {
   queryOf,
   type RunFilter,
 } from "../api/review";
-import { hasEnded } from "../api/run-stop";
-import { type Run, runPlace } from "../api/runs";
-import { boundsText } from "../status/durations";
-import { fromWords } from "../status/earlier-list";
-import { useRunStatus } from "../status/progress";
-import { StateLabel } from "../status/state-label";
-import { valuesWords } from "../status/value-words";
+import type { Run } from "../api/runs";
 import { Empty } from "../ui/empty";
-import { clock, day, instant, stopwatch, useNow } from "../ui/times";
-import { isolated } from "../words/isolated";
-import { useVersionLabel } from "./run-facts";
 import { RunFilters } from "./run-filters";
+import { RunList, type RunOfList } from "./run-list";
 import style from "./runs-page.module.css";
 
 const PAGE = 100;
 
 /** The stored list with what the live socket knows better, in the order in which it was asked for. */
-function overlaid(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>): ListedRun[] {
+function overlaid(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>): RunOfList[] {
   return stored.map((run) => {
     const now = live.get(run.id);
     if (now === undefined) return run;
@@ -59,146 +49,6 @@ function newcomers(
 ): number {
   const known = new Set(stored.map((run) => run.id));
   return [...live.values()].filter((run) => run.number > newest && !known.has(run.id)).length;
-}
-
-interface RunRowProps {
-  run: ListedRun;
-  now: number;
-  chosen: boolean;
-  onChoose: (chosen: boolean) => void;
-}
-
-/** Shows what people, and the runner after its end, have noted of a run, and what it was started with. */
-function Marks({ run }: { run: ListedRun }) {
-  return (
-    <>
-      {run.pinned && <IconPinFilled size={12} aria-label="pinned" className={style.pin} />}
-      {run.labels?.map((each) => (
-        <span key={each} className={style.label}>
-          {each}
-        </span>
-      ))}
-      {run.from && <span className={style.cause}>{fromWords(run.from)}</span>}
-      {run.values && (
-        <span className={style.cause} title={valuesWords(run.values)}>
-          with {valuesWords(run.values)}
-        </span>
-      )}
-      {run.cause && <span className={style.cause}>{run.cause}</span>}
-    </>
-  );
-}
-
-function Row({ run, now, chosen, onChoose }: RunRowProps) {
-  const [, go] = useLocation();
-  const by = useCurrentName(run.author);
-  const label = useVersionLabel(run);
-  const { tone, word } = useRunStatus(run);
-  const start = instant(run.started_at);
-  const end = instant(run.ended_at);
-  const over = end === null ? null : (boundsText(run.took) ?? "—");
-  const took = over ?? (start === null || tone === "unknown" ? "" : stopwatch(now - start));
-  const to = `/runs/${run.id}`;
-  return (
-    <tr className={style.row} onClick={() => go(to)}>
-      {/* biome-ignore lint/a11y/useKeyWithClickEvents: keeps a near miss of the box from leaving */}
-      <td className={style.choose} onClick={(event) => event.stopPropagation()}>
-        <Checkbox
-          size="xs"
-          aria-label={`Choose run ${run.number} to compare`}
-          checked={chosen}
-          disabled={run.hidden === true}
-          onChange={(event) => onChoose(event.currentTarget.checked)}
-        />
-      </td>
-      <td className={style.state}>
-        <StateLabel tone={tone} word={word} />
-      </td>
-      <td>
-        <Link
-          to={to}
-          className="ink-inherit weight-500 no-underline rounded-4"
-          onClick={(event) => event.stopPropagation()}
-        >
-          <span className={style.number}>Run {run.number}</span>{" "}
-          {run.hidden ? (
-            <span className="ink3">
-              of <bdi>{run.graph_name}</bdi>
-            </span>
-          ) : (
-            run.graph_name
-          )}
-        </Link>
-        {!run.hidden && <Marks run={run} />}
-      </td>
-      <td>{!run.hidden && <span className={style.version}>{label}</span>}</td>
-      <td className="ink2">{runPlace(run)}</td>
-      <td>{by}</td>
-      <td className="ink2">{start !== null && `${day(start, now)} ${clock(start)}`}</td>
-      <td className={style.took}>{took}</td>
-      <td className={style.figures}>
-        {run.graph !== null && (
-          <ActionIcon
-            component={Link}
-            to={`/runs/statistics?graph=${encodeURIComponent(run.graph)}`}
-            size={24}
-            variant="subtle"
-            color="gray"
-            aria-label="Statistics of its graph"
-            title={`Statistics of ${isolated(run.graph_name)}`}
-            onClick={(event: MouseEvent) => event.stopPropagation()}
-          >
-            <IconChartBar size={15} aria-hidden />
-          </ActionIcon>
-        )}
-      </td>
-    </tr>
-  );
-}
-
-interface RowsProps {
-  runs: readonly ListedRun[];
-  chosen: readonly string[];
-  onChoose: (run: string, chosen: boolean) => void;
-}
-
-function Rows({ runs, chosen, onChoose }: RowsProps) {
-  const going = runs.some((run) => !hasEnded(run));
-  const now = useNow(going ? 1000 : 30_000);
-  return (
-    <div className="border bg-panel rounded-card shadow scroll-x">
-      <table className={style.table}>
-        <thead>
-          <tr>
-            <th>
-              <span className={style.hidden}>Compare</span>
-            </th>
-            <th>State</th>
-            <th>Run</th>
-            <th>Version</th>
-            <th>On</th>
-            <th>Started by</th>
-            <th>Started</th>
-            <th className={style.took}>Took</th>
-            <th>
-              <span className={style.hidden}>Statistics</span>
-            </th>
-          </tr>
-        </thead>
-        <tbody>
-          {runs.map((run) => (
-            <Row
-              key={run.id}
-              run={run}
-              now={now}
-              chosen={chosen.includes(run.id)}
-              onChoose={(on) => onChoose(run.id, on)}
-            />
-          ))}
-        </tbody>
-      </table>
-    </div>
-  );
 }
 
 /** Pages of the list. They are asked for anew only when somebody wants to. */
@@ -358,7 +208,15 @@ export function RunsPage() {
             onChanged={() => void listed.refetch()}
           />
         )}
-        {runs.length > 0 && <Rows runs={runs} chosen={chosen} onChoose={choose} />}
+        {runs.length > 0 && (
+          <RunList
+            runs={runs}
+            chosen={chosen}
+            onChoose={choose}
+            isGapless={isGapless(filter)}
+            goesOn={listed.hasNextPage}
+          />
+        )}
         {listed.hasNextPage && (
           <Button
             variant="default"
@@ -371,6 +229,11 @@ export function RunsPage() {
       </div>
     </main>
   );
+}
+
+/** Return whether a filter leaves out no run of a graph that it shows, but for older ones. */
+function isGapless(filter: RunFilter): boolean {
+  return queryOf({ ...filter, graph: "", until: "" }).size === 0;
 }
 
 /** Return the engines by which runs can be filtered: those of the listed runs, and the chosen one. */

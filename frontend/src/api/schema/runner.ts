@@ -713,6 +713,16 @@ export interface RunnerApi {
         robots?: string[];
     };
     /**
+     * CoursePart
+     * @description A part of the time of a run, in sixtieths of it. `shows`: the result of the visits in it, the
+     *     worst one where there are several; "done": they ended with a result that nobody saw, or that is
+     *     not listed any more; "unknown": no end was seen; "none": no action was seen running.
+     */
+    CoursePart: {
+        shows: ("error" | "false" | "stopped" | "true") | ("done" | "none" | "unknown");
+        steps: number;
+    };
+    /**
      * Difference
      * @description The difference between two states of one graph. `before` and `after` are the numbers of the
      *     document's changes at which the graph was in these states.
@@ -1252,7 +1262,7 @@ export interface RunnerApi {
     /**
      * Listed
      * @description A run of the list, with the marks that people gave it. `cause`: one sentence why it did not
-     *     end well, "" if unknown.
+     *     end well, "" if unknown; `course`: its time in parts, empty until it is over and summed up.
      */
     Listed: {
         id: string;
@@ -1311,6 +1321,7 @@ export interface RunnerApi {
         note: string;
         labels: string[];
         archived: RunnerApi["ArchivedShown"] | null;
+        course: RunnerApi["CoursePart"][];
     };
     /**
      * Load

@@ -16,6 +16,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
+from action_assistant.runner.runs.course_bar import CoursePart, course_bar
 from action_assistant.runner.runs.durations import DurationBounds, duration_bounds, of_run, of_visit
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.run import Run
@@ -29,7 +30,7 @@ from action_assistant.umrf.model import Graph
 _PREFIX: Final = "about/"
 _WORDS: Final = 20_000  # characters of a run that are searched
 #: Raise it when the sum of a run changes: older sums are made again then.
-FIGURES: Final = 7
+FIGURES: Final = 8
 #: Key beside the results of an action in the table: its number of visits is a lower bound.
 AT_LEAST: Final = "at_least"
 #: Key beside them: the results that persons gave by word, which nothing showed.
@@ -87,6 +88,7 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
     cause: str = ""
     took: DurationBounds | None = None
     figures: int = 0
+    course: tuple[CoursePart, ...] = ()
 
     def __post_init__(self) -> None:
         hold_names(self, "words", "cause")
@@ -162,7 +164,7 @@ def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> 
         name: _sum(each, counts[name], {word.visit for word in run.said.get(name, ())})
         for name, each in run.actions.items()
     }
-    return SummedUp(at, actions, searched, cause, of_run(run), FIGURES)
+    return SummedUp(at, actions, searched, cause, of_run(run), FIGURES, course_bar(run))
 
 
 def _sum(action: ActionRun, count: VisitCount, by_word: Set[int]) -> ActionSum:
@@ -259,13 +261,15 @@ def _review(run: str, fields: Mapping[str, object]) -> Executable:
 
 
 def _summary_changes(run: str, summed: SummedUp) -> Sequence[Executable]:
-    """Return the statement that stores the cause and the duration of a run for lists; () if there
-    is neither."""
+    """Return the statement that stores the cause, the duration and the course of a run for lists; ()
+    if there is none of them."""
     changes: list[object] = ["$.figures", summed.figures] if summed.figures else []
     if summed.cause:
         changes += ["$.cause", summed.cause]
     if summed.took is not None:
         changes += ["$.took", func.json(msgspec.json.encode(summed.took).decode())]
+    if summed.course:
+        changes += ["$.course", func.json(msgspec.json.encode(summed.course).decode())]
     if not changes:
         return ()
     change = update(runs).where(runs.c.id == run)

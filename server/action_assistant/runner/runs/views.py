@@ -10,6 +10,7 @@ from sqlalchemy import Row
 
 from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
+from action_assistant.runner.runs.course_bar import CoursePart
 from action_assistant.runner.runs.durations import DurationBounds, of_run
 from action_assistant.runner.runs.earlier_views import (
     EarlierShown,
@@ -96,6 +97,7 @@ _BLANK: Final[dict[str, Any]] = {
     "pinned": False,
     "note": "",
     "labels": [],
+    "course": (),
     "archived": None,
     "like": None,
     "behaviours": False,
@@ -288,13 +290,14 @@ class ArchivedShown(msgspec.Struct, frozen=True):
 
 class Listed(RunSummary, frozen=True, kw_only=True):
     """A run of the list, with the marks that people gave it. `cause`: one sentence why it did not
-    end well, "" if unknown."""
+    end well, "" if unknown; `course`: its time in parts, empty until it is over and summed up."""
 
     cause: str
     pinned: bool
     note: str
     labels: list[str]
     archived: ArchivedShown | None
+    course: tuple[CoursePart, ...] = ()
 
 
 class RunShown(RunSummary, frozen=True, kw_only=True):
@@ -509,6 +512,7 @@ def list_entry(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
         note=row.note or "",
         labels=labels,
         archived=archived(row),
+        course=msgspec.convert(row.summary.get("course", ()), tuple[CoursePart, ...]),
     )
 
 
