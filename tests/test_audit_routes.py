@@ -24,7 +24,8 @@ LOOKS: Final = {
     *("editor post /api/graphs/{graph_id}/unpacking", "editor post /api/drafts/{draft_id}/preview"),
     *("editor post /api/pieces", "editor post /api/graphs/{graph_id}/rehearsal"),
     *("editor post /api/actions/{action_id}/umrf", "editor post /api/logins/look"),
-    *("runner post /api/preflight", "runner post /api/expectations/check"),
+    *("runner post /api/preflight", "runner post /api/queue/{entry}/look"),
+    "runner post /api/expectations/check",
     *("runner post /api/expectations/proposal", "runner post /api/runs/{run}/script"),
     "runner post /api/asked_inputs",
 }
@@ -205,6 +206,19 @@ def _action(name: str) -> dict[str, Any]:
     return {"name": name, "type": "sync", "instance_id": 0}
 
 
+def _queue(walk: Walk, start_of: Any) -> None:
+    for name in ("queued", "queued too"):
+        queue = walk("runner", "post", "/api/queue", {"start": start_of(name, "simulator")})
+    first, second = (each["id"] for each in queue["entries"])
+    walk("runner", "post", "/api/queue/{entry}/move", {"before": first}, entry=second)
+    walk("runner", "post", "/api/queue/{entry}/remove", entry=first)
+    queue = walk("runner", "post", "/api/queue/robots/{name}/close", name="simulator")
+    asked = {"closing": queue["robots"][0]["closed"]["closing"]}
+    walk("runner", "post", "/api/queue/robots/{name}/open", asked, name="simulator")
+    look = walk("runner", "post", "/api/queue/{entry}/look", {}, entry=second)
+    walk("runner", "post", "/api/queue/{entry}/start", {"look": look["look"]}, entry=second)
+
+
 def _view_link(walk: Walk, process: str, thing: str) -> None:
     link = walk(process, "post", "/api/view-links", {"thing": thing})["id"]
     walk(process, "post", "/api/view-links/{link}/revoke", link=link)
@@ -334,6 +348,7 @@ def _runs(walk: Walk) -> None:
     walk("runner", "post", "/api/repeats/{repeat}/close", repeat=repeat)
     walk("runner", "post", "/api/repeats/{repeat}/open", {"closings": 1}, repeat=repeat)
     walk("runner", "post", "/api/repeats/{repeat}/start", {"cell": 1}, repeat=repeat)
+    _queue(walk, start_of)
     walk("runner", "post", "/api/stop")
     _view_link(walk, "runner", run)
 

@@ -27,6 +27,8 @@ WITHOUT_BODY = frozenset(
         "/api/view-links/{link}/revoke",
         "/api/notifications/{name}/test",
         "/api/repeats/{repeat}/close",
+        "/api/queue/{entry}/remove",
+        "/api/queue/robots/{name}/close",
         "/api/runs/{run}/pause",
         "/api/robots/{name}/stop",
         "/api/robots/{name}/baton/drop",

@@ -40,6 +40,7 @@ from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.notices import KINDS, with_notices
+from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.incident import incident_times
@@ -229,8 +230,11 @@ async def _executing(
             Repeats.opened(
                 control, archive_store, clock_us=utc_us, run_in_worker=workers.starts
             ) as repeats,
+            Queues.opened(
+                control, archive_store, clock_us=utc_us, run_in_worker=workers.starts
+            ) as queues,
         ):
-            services.repeats = repeats
+            services.repeats, services.queues = repeats, queues
             for_people.recorder_of = own.recorder_of = control.recorder_of
             services.worker_queries, services.control = for_people, control
             services.hub = Hub(control, utc_us, services.requests, services.identity_now)

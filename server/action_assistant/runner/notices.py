@@ -8,6 +8,7 @@ import msgspec
 from sqlalchemy import Executable, Select, exists, func, insert, literal, or_, select, text
 
 from action_assistant.journal.events import Event, Fold
+from action_assistant.runner.queues.entry import QueueReady
 from action_assistant.runner.robots.robot_events import EngineBecame, stream_of_robot
 from action_assistant.runner.runs.events import (
     AlarmRaised,
@@ -35,6 +36,7 @@ KINDS: Final = (
     "run.held",
     "answer.asked",
     "approval.asked",
+    "queue.ready",
     "server.fault",
 )
 #: The code of the alarm of a Stop without proof.
@@ -52,12 +54,12 @@ _HOW: Final = {
 #: Microseconds in which a second message of these kinds about one thing is no news, nor the question
 #: how an action has ended, which is repeated with each state of its robot.
 _QUIET_US: Final = 600_000_000
-_QUIET: Final = frozenset({"run.stop_unconfirmed", "robot.lost"})
+_QUIET: Final = frozenset({"run.stop_unconfirmed", "robot.lost", "queue.ready"})
 _EVENTS: Final = frozenset(
     each.kind
     for each in (
         *(Ended, AlarmRaised, Held, PieceRest),
-        *(QuestionAsked, EngineBecame, ApprovalAsked),
+        *(QuestionAsked, EngineBecame, ApprovalAsked, QueueReady),
     )
 )
 
@@ -92,6 +94,15 @@ def notices(event: Event, receivers: Sequence[Receiver]) -> list[Executable]:
             "id": asked.graph or "",
         }
         return _statements(event, receivers, "approval.asked", asked.at, facts, None)
+    if event.kind == QueueReady.kind:
+        ready = msgspec.json.decode(event.body, type=QueueReady)
+        facts = {
+            "person": ready.person,
+            "graph": ready.graph_name,
+            "robot": ", ".join(ready.robots),
+            "id": ready.graph or "",
+        }
+        return _statements(event, receivers, "queue.ready", ready.at, facts, None)
     if event.kind == EngineBecame.kind:
         became = msgspec.json.decode(event.body, type=EngineBecame)
         how = _HOW.get(became.state)

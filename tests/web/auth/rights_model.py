@@ -49,6 +49,7 @@ PERSON_ONLY: Final = re.compile(
     r"(get|post) /api/tokens$|/api/logins/(look|confirm|refuse)|/api/devices|post /api/approvals"
     r"|post /api/robots/.*/drills|/api/runs/[^/]+/(at_rest|go_on|step|outcome|breakpoints|questions/)"
     r"|/api/tokens/.*/revoke$|/api/repeats/[^/]+/(start|open)$"
+    r"|/api/queue/[^/]+/start$|/api/queue/robots/[^/]+/open$"
     r"|/api/confirmations|/api/passkeys|/api/mentions"
 )
 #: What a robot was sent, of which nobody knows whose graph it is: for those who may see every graph.

@@ -51,6 +51,8 @@ FOR_PEOPLE = {
     ("post", "/api/runs/{run}/questions/{question}/photo"),
     ("post", "/api/repeats/{repeat}/start"),
     ("post", "/api/repeats/{repeat}/open"),
+    ("post", "/api/queue/{entry}/start"),
+    ("post", "/api/queue/robots/{name}/open"),
     ("post", "/api/robots/{name}/drills"),
 }
 #: Paths of which every route is for people, or for links that show one thing.

@@ -827,6 +827,36 @@ export interface RunnerApi {
         engines: RunnerApi["Robot"][];
     };
     /**
+     * EntryShown
+     * @description A start that waits. `robots`: those that may move, none in the simulator; `differs`: sentences
+     *     about what is no longer as it was when it was put there; `ready_at`: since when it may be started;
+     *     `hidden`: the reader may not see its graph.
+     */
+    EntryShown: {
+        id: string;
+        graph: string | null;
+        graph_name: string;
+        version: string;
+        digest: string;
+        engine: string;
+        robots: string[];
+        values: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        author: RunnerApi["Author"];
+        /** Format: date-time */
+        entered_at: string;
+        by_itself: boolean;
+        /** @enum {string} */
+        state: "changed" | "closed" | "ready" | "waiting";
+        waits: RunnerApi["WaitingShown"][];
+        differs: string[];
+        ready_at: string | null;
+        hidden: boolean;
+    };
+    /**
      * Expect
      * @description A request to expect a course under a name: that of a `run`, or that of a graph in a dry-run
      *     with this script. `subgraphs`: the graphs inside of that graph.
@@ -1355,6 +1385,26 @@ export interface RunnerApi {
         reason: string;
     };
     /**
+     * LookRequest
+     * @description Asks for the pre-flight of an entry as it is now. `watching`: as in `StartRequest`.
+     */
+    LookRequest: {
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
+     * LookShown
+     * @description The pre-flight of an entry now. `look`: by which its start says what was looked at; `differs`: as
+     *     of the entry.
+     */
+    LookShown: {
+        look: string;
+        looks: RunnerApi["Preflight"][];
+        differs: string[];
+    };
+    /**
      * MarkShown
      * @description An event that is no observation of the engine. `since`: from when on the state was unknown.
      */
@@ -1415,6 +1465,14 @@ export interface RunnerApi {
         sight?: RunnerApi["Sight"] | null;
     };
     /**
+     * MoveRequest
+     * @description Moves an entry. `before`: the id of the entry that comes after it then, "" for the end.
+     */
+    MoveRequest: {
+        /** @default  */
+        before?: string;
+    };
+    /**
      * NeverTaken
      * @description An arrow whose parent ran and certainly never ended with one of the arrow's `outcomes`.
      */
@@ -1467,6 +1525,14 @@ export interface RunnerApi {
         id: string;
         text: string;
         moved: boolean;
+    };
+    /**
+     * OpenQueueRequest
+     * @description Opens the closed queue of a robot again after a look. `closing`: that of the queue, as the person
+     *     saw it.
+     */
+    OpenQueueRequest: {
+        closing: string;
     };
     /**
      * OperatorShown
@@ -1794,6 +1860,39 @@ export interface RunnerApi {
         open: RunnerApi["QuestionShown"][];
         closed: RunnerApi["ClosedQuestion"][];
         pauses: RunnerApi["PauseShown"][];
+    };
+    /**
+     * QueueClosedShown
+     * @description The reason why the queue of a robot is closed, in words. `closing`: by which a person says that
+     *     they have seen it; `by`: the person who caused it, `run`: the run that did.
+     */
+    QueueClosedShown: {
+        closing: string;
+        /** @enum {string} */
+        why: "baton" | "complete" | "looked" | "lost" | "moves" | "person" | "refused" | "restart" | "run" | "stop";
+        text: string;
+        /** Format: date-time */
+        at: string;
+        by: RunnerApi["Author"] | null;
+        run: string | null;
+    };
+    /**
+     * QueueRequest
+     * @description Puts a start into the queue. `by_itself`: in the simulator alone, it starts when its turn comes.
+     *     The `request_id` of the start names the entry: it is put there once.
+     */
+    QueueRequest: {
+        start: RunnerApi["StartRequest"];
+        /** @default false */
+        by_itself?: boolean;
+    };
+    /**
+     * QueueShown
+     * @description All entries in their order, and the queues of the robots for which something waits.
+     */
+    QueueShown: {
+        entries: RunnerApi["EntryShown"][];
+        robots: RunnerApi["RobotQueueShown"][];
     };
     /**
      * RawHour
@@ -2283,6 +2382,15 @@ export interface RunnerApi {
         how: ("dropped" | "fell" | "forced" | "handed" | "off" | "taken") | "";
         was: string;
         to: string;
+    };
+    /**
+     * RobotQueueShown
+     * @description The queue of one robot, or of the simulator, by the ids of its entries in their order.
+     */
+    RobotQueueShown: {
+        robot: string;
+        entries: string[];
+        closed: RunnerApi["QueueClosedShown"] | null;
     };
     /**
      * RobotRestShown
@@ -3113,6 +3221,18 @@ export interface RunnerApi {
         address: string;
     };
     /**
+     * TurnRequest
+     * @description Starts an entry whose turn it is. `look`: that of the newest look, as the person saw it;
+     *     `watching`: as in `StartRequest`.
+     */
+    TurnRequest: {
+        look: string;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
      * UnderWay
      * @description An action that had begun and had no outcome when the earlier run was stopped. `robot`: that played
      *     it; `seen`: the outcome that was seen after the Stop, "" for none.
@@ -3224,6 +3344,17 @@ export interface RunnerApi {
         may: boolean;
         /** @default  */
         why?: string;
+    };
+    /**
+     * WaitingShown
+     * @description The reason why an entry waits for one robot, in words. `run`: the id of the run that goes on there.
+     */
+    WaitingShown: {
+        robot: string;
+        /** @enum {string} */
+        why: "behind" | "closed" | "run" | "stop";
+        text: string;
+        run: string | null;
     };
     /**
      * Where
@@ -3353,6 +3484,28 @@ export interface RunnerPaths {
     };
     "/api/repeats/{repeat}/open": {
         post: RunnerOperations["reopenRepeat"];
+    };
+    "/api/queue": {
+        get: RunnerOperations["getQueue"];
+        post: RunnerOperations["enterQueue"];
+    };
+    "/api/queue/{entry}/look": {
+        post: RunnerOperations["lookAtEntry"];
+    };
+    "/api/queue/{entry}/start": {
+        post: RunnerOperations["startEntry"];
+    };
+    "/api/queue/{entry}/move": {
+        post: RunnerOperations["moveEntry"];
+    };
+    "/api/queue/{entry}/remove": {
+        post: RunnerOperations["removeEntry"];
+    };
+    "/api/queue/robots/{name}/close": {
+        post: RunnerOperations["closeQueue"];
+    };
+    "/api/queue/robots/{name}/open": {
+        post: RunnerOperations["openQueue"];
     };
     "/api/labels": {
         get: RunnerOperations["listLabels"];
@@ -4038,6 +4191,143 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["RepeatShown"];
+                };
+            };
+        };
+    };
+    getQueue: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
+                };
+            };
+        };
+    };
+    enterQueue: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["QueueRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
+                };
+            };
+        };
+    };
+    lookAtEntry: {
+        parameters: {
+            path: {
+                entry: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["LookRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["LookShown"];
+                };
+            };
+        };
+    };
+    startEntry: {
+        parameters: {
+            path: {
+                entry: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["TurnRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    moveEntry: {
+        parameters: {
+            path: {
+                entry: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["MoveRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
+                };
+            };
+        };
+    };
+    removeEntry: {
+        parameters: {
+            path: {
+                entry: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
+                };
+            };
+        };
+    };
+    closeQueue: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
+                };
+            };
+        };
+    };
+    openQueue: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["OpenQueueRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["QueueShown"];
                 };
             };
         };

@@ -45,6 +45,7 @@ FILTERED: Final = frozenset(
             "/api/starts/{request_id:str}",
             "/api/repeats",
             "/api/repeats/{repeat:str}",
+            "/api/queue",
         ),
         *("/api/stop", "/api/robots/{name:str}/stop", "/api/live", "/api/labels"),
         *("/api/comparison", "/api/statistics", "/api/approvals", "/api/approvals/asked"),
@@ -55,6 +56,8 @@ FILTERED: Final = frozenset(
         *("/api/robots/{name:str}/rights", "/api/robots/{name:str}/lock"),
         *("/api/robots/{name:str}/unlock", "/api/robots/{name:str}/drills"),
         *(f"/api/repeats/{{repeat:str}}/{each}" for each in ("table", "start", "close", "open")),
+        *(f"/api/queue/{{entry:str}}/{each}" for each in ("look", "start", "move", "remove")),
+        *("/api/queue/robots/{name:str}/close", "/api/queue/robots/{name:str}/open"),
         *(f"/api/robots/{{name:str}}/baton/{each}" for each in ("take", "hand", "drop")),
     }
 )

@@ -23,7 +23,15 @@ from action_assistant.runner.analysis.course_checks import (
     propose,
 )
 from action_assistant.runner.analysis.expected_runs import Expect, Expectation
-from action_assistant.runner.api import led_runs, questions, repeats, review, rights, robots
+from action_assistant.runner.api import (
+    led_runs,
+    questions,
+    queues,
+    repeats,
+    review,
+    rights,
+    robots,
+)
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
     PageMessage,
@@ -104,6 +112,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *led_runs.routes(services),
         *questions.routes(services),
         *repeats.routes(services),
+        *queues.routes(services),
         *_queries(services),
         *robots.routes(services),
         *rights.routes(services),

@@ -12,6 +12,7 @@ from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
@@ -51,6 +52,7 @@ class RunnerServices:
     notifications: Notifications
     photos: Photos
     repeats: Repeats
+    queues: Queues
     sight: RunSight
 
     def __init__(self) -> None:

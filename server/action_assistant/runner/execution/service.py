@@ -221,9 +221,14 @@ class ExecutionService:
         it names; "" for both where it stops everything."""
         self._stop_watchers.append(watcher)
 
-    def hold_back(self, repeat: str, author: Author) -> None:
-        """Let no start of a repeat leave that was requested before: a Stop was pressed."""
-        self._stops.note(repeat, author)
+    def hold_back(self, what: str, author: Author) -> None:
+        """Let no start leave that was requested before, of the repeat or with the request id `what`: a
+        Stop was pressed."""
+        self._stops.note(what, author)
+
+    def occupying(self, robot: str) -> Run | None:
+        """Return the open run that keeps a robot occupied; None if no run does."""
+        return self._runs.occupying(robot)
 
     def _tell_of_stop(self, author: Author, robot: str, run: str) -> None:
         for watcher in self._stop_watchers:

@@ -188,7 +188,8 @@ class StartPipeline:
             opened = self._open(accepted, requested, run, starter)
             if occupied:
                 opened.end("refused", occupied)
-            stopped = (*robots, group or "", repeat.id if repeat is not None else "")
+            of_repeat = repeat.id if repeat is not None else ""
+            stopped = (*robots, group or "", of_repeat, accepted.request.request_id)
             if pressed := self._stops.since(stops, *stopped):
                 opened.stop(*pressed)
             self._runs.drive(opened, order, accepted.incarnation)

@@ -35,6 +35,8 @@ _NEVER: Final = (
     *("robot.commanded.v1", "robot.engine_became.v1", "robot.stop_proven.v1"),
     *(
         "repeat.start_kept.v1",
+        "queue.start_kept.v1",
+        "queue.ready.v1",
         "robot.stop_unproven.v1",
         "robot.index_written.v1",
         "raw.archived.v1",
@@ -113,6 +115,11 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "repeat.opened.v1": ("starts", "opened a repeat of {graph_name}"),
     "repeat.reopened.v1": ("starts", "opened a repeat again after a look"),
     "repeat.closed.v1": ("starts", "closed a repeat: {text}"),
+    "queue.entered.v1": ("starts", "put a start of {graph_name} into the queue"),
+    "queue.moved.v1": ("starts", "moved a start in the queue"),
+    "queue.left.v1": ("starts", "removed a start from the queue"),
+    "queue.closed.v1": ("starts", "closed the queue of {robot}: {text}"),
+    "queue.opened.v1": ("starts", "opened the queue of {robot} again after a look"),
     "approval.given.v1": ("starts", "said yes to the graph of a start"),
     "engine.indexes_once.v1": ("robots", "said that the engine of {robot} indexes once: {reason}"),
 }
@@ -184,8 +191,8 @@ class RunnerFacts:
                 late = " too late" if event.kind == "run.answer_refused.v1" else ""
                 text = f"answered {body.node} in {{run}}{late}"
                 return self._about_run(whole, "starts", text)
-            case "repeat.closed.v1" if body.by is None:
-                return None  # the runner closed it by itself
+            case "repeat.closed.v1" | "queue.closed.v1" | "queue.left.v1" if body.by is None:
+                return None  # the runner did it by itself
             case "run.handed_over.v1":
                 to = body.to.name if isinstance(body.to, _PersonBody) else ""
                 return self._about_run(whole, "robots", f"handed {{run}} over to {to}")

@@ -14,6 +14,7 @@ from sqlalchemy import (
     Text,
     and_,
     cast,
+    exists,
     func,
     literal,
     not_,
@@ -119,6 +120,28 @@ def kinds_of_repeats(but: str) -> Select[Any]:
         event.stream > "repeat/", event.stream < "repeat0", event.kind != but
     )
     return chosen.order_by(event.position.desc())
+
+
+def waiting(but: str, left: str) -> Select[Any]:
+    """Select stream, kind and body of the events of all entries of the queue that have not left it, the
+    oldest first, without those of the kind `but`. `left`: the kind that says that one has left."""
+    event, other = runner_event.c, runner_event.alias("other")
+    is_left = exists(
+        select(other.c.seq).where(other.c.stream == event.stream, other.c.kind == left)
+    )
+    chosen = select(event.stream, event.kind, event.body).where(
+        event.stream > "queue/", event.stream < "queue0", event.kind != but, ~is_left
+    )
+    return chosen.order_by(event.position)
+
+
+def newest_move(moved: str) -> Select[Any]:
+    """Select the body of the newest event of the queue of the kind `moved`."""
+    event = runner_event.c
+    chosen = select(event.body).where(
+        event.stream > "queue/", event.stream < "queue0", event.kind == moved
+    )
+    return chosen.order_by(event.position.desc()).limit(1)
 
 
 class Filter(msgspec.Struct, frozen=True, kw_only=True):

@@ -51,6 +51,10 @@ KINDS: Final[Mapping[str, Kind]] = {
     "approval.asked": Kind(
         "{person} asks a second person to say yes to {graph} for {robot}.", "/graphs/{id}"
     ),
+    "queue.ready": Kind(
+        "It is the turn of {graph} on {robot}, which {person} has put into the queue.",
+        "/runs/queue",
+    ),
     "server.fault": Kind("The server needs a person. {why}", "/admin"),
     "mention": Kind(
         "{person} has mentioned {people} in a comment on {graph}.", "/graphs/{id}?comment={key}"

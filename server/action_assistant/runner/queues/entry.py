@@ -1,0 +1,295 @@
+"""An entry of the queue: one start that waits for its robots. Pure.
+
+Its stream `queue/ID` says who put it there, what was looked at, and how it left the queue; the stream
+`queue-robot/NAME` says when the queue of a robot was closed, and opened again.
+"""
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, ClassVar, Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.robots.rights import Rules
+from action_assistant.runner.runs.doubts import ClosedWhy
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.start.admission import StartRequest, Watching
+from action_assistant.runner.start.kept_starts import text_of
+from action_assistant.runner.start.orders import engines_of
+from action_assistant.runner.start.preflight import Item, Preflight
+from action_assistant.umrf.start_values import StartValues
+
+#: The most entries, of everybody and of one person.
+MOST: Final = 100
+MOST_OF_ONE: Final = 50
+_PREFIX: Final = "queue/"
+_ROBOT_PREFIX: Final = "queue-robot/"
+
+#: Items of a pre-flight that change while a start waits: about other runs on the robot, and what its
+#: person says or does at the start itself.
+_OF_THE_MOMENT: Final = frozenset(
+    {"free", "again", "quiet", "rest", "baton", "confirm", "watched", "present", "approved"}
+)
+#: Of these, those that may be missing when a queue is opened: nothing starts by that.
+_AT_THE_START: Final = frozenset({"free", "confirm", "watched", "present", "approved"})
+_WORSE: Final = {"passed": 0, "warned": 1, "blocked": 2}
+
+_Id = Annotated[str, msgspec.Meta(max_length=100)]
+
+
+class QueueRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Puts a start into the queue. `by_itself`: in the simulator alone, it starts when its turn comes.
+    The `request_id` of the start names the entry: it is put there once."""
+
+    start: StartRequest
+    by_itself: bool = False
+
+
+class LookRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Asks for the pre-flight of an entry as it is now. `watching`: as in `StartRequest`."""
+
+    watching: Watching = {}
+
+
+class TurnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Starts an entry whose turn it is. `look`: that of the newest look, as the person saw it;
+    `watching`: as in `StartRequest`."""
+
+    look: Annotated[str, msgspec.Meta(max_length=100)]
+    watching: Watching = {}
+
+
+class MoveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Moves an entry. `before`: the id of the entry that comes after it then, "" for the end."""
+
+    before: _Id = ""
+
+
+class OpenQueueRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Opens the closed queue of a robot again after a look. `closing`: that of the queue, as the person
+    saw it."""
+
+    closing: _Id
+
+
+class Looked(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The part of a pre-flight that has to stay as it is. `items`: the verdicts by engine and code,
+    but those of the moment; `rules`: of each robot, as JSON; `tree_digest`: of what was looked at."""
+
+    items: dict[str, dict[str, str]]
+    rules: dict[str, str] = {}
+    tree_digest: str = ""
+
+
+class QueueEntered(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A person put a start into the queue; nothing was started by it. `robots`: those that it waits for,
+    none for one in the simulator; `order`: the hash of all that was ordered; `seen`: the look of its
+    person; `inside`, `unsighted`: as of a run."""
+
+    kind: ClassVar[str] = "queue.entered.v1"
+
+    at: int
+    entry: str
+    request_id: str
+    order: str
+    author: Author
+    graph: str | None
+    graph_name: str
+    version: str
+    digest: str
+    engine: str
+    robots: tuple[str, ...]
+    seen: Looked
+    values: StartValues = {}
+    by_itself: bool = False
+    inside: tuple[str, ...] = ()
+    unsighted: bool = False
+
+
+class QueueStartKept(msgspec.Struct, frozen=True):
+    """The start of an entry as it was sent, with its graph."""
+
+    kind: ClassVar[str] = "queue.start_kept.v1"
+
+    start: msgspec.Raw
+
+
+class QueueReady(msgspec.Struct, frozen=True, kw_only=True):
+    """The turn of an entry came: its robots were free, and it was the first. Nothing was started by
+    that."""
+
+    kind: ClassVar[str] = "queue.ready.v1"
+
+    at: int
+    person: str
+    graph: str | None
+    graph_name: str
+    robots: tuple[str, ...]
+
+
+class QueueMoved(msgspec.Struct, frozen=True, kw_only=True):
+    """A person moved an entry. `order`: the ids of all entries after that."""
+
+    kind: ClassVar[str] = "queue.moved.v1"
+
+    at: int
+    author: Author
+    order: tuple[str, ...]
+
+
+class QueueLeft(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """An entry left the queue: a `run` was made of it, or the person `by` removed it."""
+
+    kind: ClassVar[str] = "queue.left.v1"
+
+    at: int
+    run: str = ""
+    by: Author | None = None
+
+
+class QueueClosed(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The queue of a robot was closed: nothing of it is started. `by`: the person who caused it; `run`:
+    the run that did."""
+
+    kind: ClassVar[str] = "queue.closed.v1"
+
+    at: int
+    why: ClosedWhy
+    text: str
+    by: Author | None = None
+    run: str = ""
+
+
+class QueueOpened(msgspec.Struct, frozen=True, kw_only=True):
+    """A person has looked, and opened the queue of a robot again."""
+
+    kind: ClassVar[str] = "queue.opened.v1"
+
+    at: int
+    author: Author
+
+
+Wait: TypeAlias = Literal["closed", "run", "stop", "behind"]
+
+
+class Waiting(msgspec.Struct, frozen=True):
+    """The reason why an entry waits for one robot: its queue is closed; a `run` goes on; something is
+    being stopped there; it is behind so many others."""
+
+    robot: str
+    why: Wait
+    run: str = ""
+    behind: int = 0
+
+
+def stream_of(entry: str) -> str:
+    """Return the name of the stream of an entry."""
+    return f"{_PREFIX}{entry}"
+
+
+def stream_of_robot(robot: str) -> str:
+    """Return the name of the stream of the queue of a robot."""
+    return f"{_ROBOT_PREFIX}{robot}"
+
+
+def entry_id(request_id: str) -> str:
+    """Return the id of the entry that the start with this request id makes."""
+    return hashlib.sha256(f"queue {request_id}".encode()).hexdigest()[:22]
+
+
+def request_of(entry: str) -> str:
+    """Return the request id of the one start of an entry."""
+    return f"{_PREFIX}{entry}"
+
+
+def order_of(request: QueueRequest) -> str:
+    """Return the hash of all that an entry orders."""
+    return hashlib.sha256(bytes(text_of(request.start)) + b"%d" % request.by_itself).hexdigest()
+
+
+def require_queueable(request: QueueRequest) -> None:
+    """Raise BadInput for a start that cannot wait."""
+    start = request.start
+    if start.drill or start.start_from is not None:
+        where: dict[str, object] = {"path": "/start/drill" if start.drill else "/start/from"}
+        text = "A Stop drill, and a start that takes outcomes of an earlier run, cannot wait."
+        raise BadInput(text, where=where)
+    if start.watching:
+        text = "A person says that they watch when it starts, not when it is put into the queue."
+        raise BadInput(text, where={"path": "/start/watching"})
+    if request.by_itself and (engines_of(start) or start.behaviours):
+        text = "A person starts whatever may move something: by itself a start goes in the simulator alone."
+        raise BadInput(text, where={"path": "/by_itself"})
+
+
+def looked_of(looks: Sequence[Preflight], rules: Mapping[str, Rules]) -> Looked:
+    """Return what has to stay as it is of a pre-flight. `rules`: of each robot of the start."""
+    items: dict[str, dict[str, str]] = {
+        each.engine: {
+            item.code: item.verdict for item in each.items if item.code not in _OF_THE_MOMENT
+        }
+        for each in looks
+    }
+    words = {name: msgspec.json.encode(each).decode() for name, each in rules.items()}
+    return Looked(items, words, next((each.tree_digest for each in looks if each.tree_digest), ""))
+
+
+def digest_of(looked: Looked) -> str:
+    """Return the digest by which a person says what they have looked at."""
+    return hashlib.sha256(msgspec.json.encode(looked, order="deterministic")).hexdigest()[:22]
+
+
+def differences(seen: Looked, now: Looked, looks: Sequence[Preflight]) -> tuple[str, ...]:
+    """Return a sentence for each thing that is no longer as it was `seen`: rules of a robot that have
+    changed, and items that were better. `now`: the part of `looks` that counts."""
+    found = [
+        f"The rules of {robot} have changed."
+        for robot, rules in now.rules.items()
+        if seen.rules.get(robot) != rules
+    ]
+    if now.tree_digest and now.tree_digest != seen.tree_digest:
+        found.append("A graph inside of it is another one.")
+    for look in looks:
+        known = seen.items.get(look.engine, {})
+        for item in look.items:
+            before = known.get(item.code, "passed")
+            is_counted = item.code not in _OF_THE_MOMENT
+            if is_counted and _WORSE[item.verdict] > _WORSE.get(before, 0):
+                found.append(item.text)
+    return tuple(dict.fromkeys(found))
+
+
+def require_waitable(start: StartRequest, looks: Iterable[Preflight]) -> None:
+    """Raise Conflict if a pre-flight finds something that no waiting mends."""
+    _require_none(_blocking(start, looks, _OF_THE_MOMENT))
+
+
+def require_openable(start: StartRequest, looks: Iterable[Preflight], robot: str) -> None:
+    """Raise Conflict if a pre-flight finds something on a robot that keeps its queue closed."""
+    of_robot = [each for each in looks if each.engine in {robot, start.engine}]
+    _require_none(_blocking(start, of_robot, _AT_THE_START))
+
+
+def _blocking(start: StartRequest, looks: Iterable[Preflight], but: frozenset[str]) -> list[Item]:
+    overridden = set(start.override.codes) if start.override is not None else set[str]()
+    return [
+        each
+        for look in looks
+        for each in look.items
+        if each.verdict == "blocked"
+        and each.code not in but
+        and not (each.overridable and overridden.issuperset(each.codes))
+    ]
+
+
+def _require_none(blocked: Sequence[Item]) -> None:
+    if blocked:
+        text = " ".join(each.text for each in blocked[:3])
+        raise Conflict(text, where={"path": "/start", "item": blocked[0].code})
+
+
+def lanes_of(robots: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the queues in which a start for these robots waits."""
+    return tuple(robots) or (SIMULATOR,)

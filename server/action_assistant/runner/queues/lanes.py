@@ -1,0 +1,72 @@
+"""The queue of each robot in memory, and the entries that wait in it."""
+
+import anyio
+import msgspec
+
+from action_assistant.kit.lru_cache import LruCache
+from action_assistant.runner.execution.doubts import Closable
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.queues.entry import QueueClosed, QueueEntered, Waiting, lanes_of
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.sight import RunGraphs
+from action_assistant.runner.start.preflight import Preflight
+from action_assistant.web.auth.identity import Identity
+
+
+class Lane(Closable):
+    """The queue of one robot, or of the simulator, while something waits in it. `robots_of`: the robots
+    of known runs, "simulator" for those that came from its queue; `closed`: why it is closed, None while
+    it is open; `entering`: how many starts are being put into it."""
+
+    def __init__(self, name: str, robots_of: LruCache[str, frozenset[str]]) -> None:
+        super().__init__(() if name == SIMULATOR else (name,))
+        self.name = name
+        self.closed: QueueClosed | None = None
+        self.entering = 0
+        self._robots_of = robots_of
+
+    def owns(self, run: str) -> bool:
+        """Return whether a run, or a group, is on the robot."""
+        return self.name in (self._robots_of.get(run) or ())
+
+
+class Entry:
+    """A start in the queue. `by`: in whose name it may start by itself; `waits`: why it waits, empty when
+    its turn has come; `ready_at`: since when that is so, µs UTC; `differs`: what is no longer as its
+    person saw it, by the look of the runner; `turn`: one start, or removal, at a time."""
+
+    def __init__(self, entered: QueueEntered) -> None:
+        self.entered = entered
+        self.by: tuple[Author, Identity] | None = None
+        self.waits: tuple[Waiting, ...] = ()
+        self.ready_at: int | None = None
+        self.differs: tuple[str, ...] = ()
+        self.turn = anyio.Lock()
+
+    @property
+    def id(self) -> str:
+        """The id of the entry."""
+        return self.entered.entry
+
+    @property
+    def lanes(self) -> tuple[str, ...]:
+        """The names of the queues in which it waits."""
+        return lanes_of(self.entered.robots)
+
+    @property
+    def graphs(self) -> RunGraphs:
+        """The facts that decide who may see it, as of its run."""
+        entered = self.entered
+        graphs = dict.fromkeys([entered.graph, *entered.inside])
+        return RunGraphs(
+            entered.author.id, tuple(each for each in graphs if each), entered.unsighted
+        )
+
+
+class Look(msgspec.Struct, frozen=True):
+    """A pre-flight of an entry. `differs`: what is no longer as its person saw it; `digest`: by which a
+    person says that they have looked at it."""
+
+    looks: tuple[Preflight, ...]
+    differs: tuple[str, ...]
+    digest: str

@@ -1,0 +1,646 @@
+"""The queues of this process: which starts wait for which robots, what closes a queue, and the starts.
+
+Entries are stored, and there again after a restart of the runner; that a queue is open is in the memory
+of the process in which a person put something into it, or opened it. It is closed in the step in which
+the doubt is seen. A person starts each entry, except in the simulator, where it may start by itself. An
+entry is started at most once: its start has one request id for ever, and what it became leaves the queue
+in the step in which the run is there.
+"""
+
+import logging
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
+from typing import Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import Conflict, Forbidden, NotFound, Refused, Unavailable
+from action_assistant.journal.events import Event
+from action_assistant.kit.clock import ClockUs
+from action_assistant.kit.lru_cache import LruCache
+from action_assistant.runner.execution.doubts import DoubtWatch
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.execution.start_pipeline import Started
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.queues.entry import (
+    MOST,
+    MOST_OF_ONE,
+    Looked,
+    MoveRequest,
+    OpenQueueRequest,
+    QueueClosed,
+    QueueEntered,
+    QueueLeft,
+    QueueMoved,
+    QueueOpened,
+    QueueReady,
+    QueueRequest,
+    QueueStartKept,
+    TurnRequest,
+    Waiting,
+    differences,
+    digest_of,
+    entry_id,
+    lanes_of,
+    looked_of,
+    order_of,
+    request_of,
+    require_openable,
+    require_queueable,
+    require_waitable,
+    stream_of,
+    stream_of_robot,
+)
+from action_assistant.runner.queues.lanes import Entry, Lane, Look
+from action_assistant.runner.runs import queries
+from action_assistant.runner.runs.doubts import Doubt
+from action_assistant.runner.runs.events import Author, StoredKind, draft_of
+from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.admission import StartRequest, Watching
+from action_assistant.runner.start.kept_starts import graph_of, group_of, start_of, text_of
+from action_assistant.runner.start.orders import engines_of, watched_in
+from action_assistant.web.auth.caller import BackgroundTasks
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.rights import Denied, may
+from action_assistant.web.auth.roles import OWNER
+from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
+
+_REMEMBERED: Final = 2000  # runs and groups
+_STORE_S: Final = 1.0  # between two attempts to store something that has happened
+_RESTARTED: Final = "The runner was started again. Nothing of the queue goes on after that."
+
+
+class Queues:
+    """Puts starts into queues, and carries them out. Use the context manager `opened` to get one.
+    `author` is the person in whose name a command is recorded."""
+
+    def __init__(
+        self,
+        control: ExecutionService,
+        journal: RunnerJournal,
+        clock_us: ClockUs,
+        tasks: BackgroundTasks,
+        run_in_worker: RunInWorker,
+    ) -> None:
+        self._control = control
+        self._journal = journal
+        self._clock_us = clock_us
+        self._tasks = tasks
+        self._run_in_worker = run_in_worker
+        self._entries: list[Entry] = []
+        self._lanes: dict[str, Lane] = {}
+        self._going: set[str] = set()  # runs that are not over
+        self._robots_of: LruCache[str, frozenset[str]] = LruCache(_REMEMBERED)
+        self._entering = anyio.Lock()
+        self._watchers: list[Callable[[], None]] = []
+        self._doubts = DoubtWatch[Lane](control, self._lanes.values, self._close)
+        control.watch(self._run_changed)
+        control.watch_robots(self._survey)
+
+    @classmethod
+    @asynccontextmanager
+    async def opened(
+        cls,
+        control: ExecutionService,
+        journal: RunnerJournal,
+        *,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
+    ) -> "AsyncIterator[Queues]":
+        """Return a context with the queues of a runner. Those in which an earlier process left something
+        are closed. Raise Unavailable if the journal cannot be read."""
+        async with anyio.create_task_group() as tasks:
+            queues = cls(control, journal, clock_us, BackgroundTasks(tasks), run_in_worker)
+            await queues._load()
+            try:
+                yield queues
+            finally:
+                queues._entries.clear()
+                queues._lanes.clear()  # runs change further, while nobody stores what that closes
+                tasks.cancel_scope.cancel()
+
+    def watch(self, watcher: Callable[[], None]) -> None:
+        """Call `watcher` at once whenever an entry or a queue has changed."""
+        self._watchers.append(watcher)
+
+    def _changed(self) -> None:
+        for watcher in self._watchers:
+            watcher()
+
+    # --- what there is ------------------------------------------------------------------------
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """All entries, in the order in which people have put or moved them."""
+        return tuple(self._entries)
+
+    @property
+    def lanes(self) -> tuple[Lane, ...]:
+        """The queues in which something waits, by name."""
+        used = {name for each in self._entries for name in each.lanes}
+        return tuple(self._lanes[name] for name in sorted(used))
+
+    def find(self, id_: str) -> Entry:
+        """Return an entry that waits. Raise NotFound if there is none with this id."""
+        found = next((each for each in self._entries if each.id == id_), None)
+        if found is None:
+            raise NotFound("This is not in the queue: it has left it, or never was.")
+        return found
+
+    async def _start_in(self, entry: Entry, watching: Watching) -> StartRequest:
+        """Return the one start of an entry. Raise BadInput if a person watches a robot that does not
+        move, Unavailable if it cannot be read."""
+        watched_in(watching, entry.entered.robots)
+        start = _kept_in(await self._journal.read(stream_of(entry.id)))
+        return msgspec.structs.replace(start, request_id=request_of(entry.id), watching=watching)
+
+    async def _look(
+        self, start: StartRequest, seen: Looked, identity: Identity
+    ) -> tuple[Look, Looked]:
+        looks = await self._control.look(group_of(start), identity.person.id, identity)
+        rules = {name: self._control.rights.of(name).rules for name in engines_of(start)}
+        now = looked_of(looks, rules)
+        return Look(tuple(looks), differences(seen, now, looks), digest_of(now)), now
+
+    async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
+        """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
+        wait, Forbidden if they may not see its graph."""
+        entry = self.find(id_)
+        start = await self._start_in(entry, watching)
+        return (await self._look(start, entry.entered.seen, identity))[0]
+
+    # --- put, move, remove --------------------------------------------------------------------
+
+    async def put(
+        self, request: QueueRequest, author: Author, identity: Identity
+    ) -> tuple[Entry, bool]:
+        """Put a start into the queue, once for its request id, and return the entry, and whether it is
+        new. Nothing is started by it, except in the simulator where the person has said so. Raise a
+        subclass of Refused if it cannot wait, or cannot be stored."""
+        require_queueable(request)
+        start, robots = request.start, engines_of(request.start)
+        graphs = (start.graph, *(each.graph for each in start.subgraphs))
+        self._control.sight.require_graphs(identity, *graphs)
+        lanes = [self._lane(name) for name in lanes_of(robots)]
+        for lane in lanes:
+            lane.entering += 1  # a Stop from here on closes it
+        try:
+            known = await self._known(request, author)
+            if known is not None:
+                return known, False
+            self._require_capacity(author)
+            graph = await self._run_in_worker(graph_of, start)
+            unseen = Looked({})
+            look, seen = await self._look(start, unseen, identity)
+            require_waitable(start, look.looks)
+            entered = QueueEntered(
+                at=self._clock_us(),
+                entry=entry_id(start.request_id),
+                request_id=start.request_id,
+                order=order_of(request),
+                author=author,
+                graph=start.graph,
+                graph_name=graph.name,
+                version=start.version,
+                digest=start.digest,
+                engine=start.engine,
+                robots=robots,
+                seen=seen,
+                values=start.values,
+                by_itself=request.by_itself,
+                inside=tuple(each.graph for each in start.subgraphs if each.graph)
+                + (start.sight.graphs if start.sight is not None else ()),
+                unsighted=start.sight is None and self._control.sight.has_rules,
+            )
+            return await self._enter(entered, request, identity)
+        finally:
+            for lane in lanes:
+                lane.entering -= 1
+            self._drop_empty()
+
+    async def _enter(
+        self, entered: QueueEntered, request: QueueRequest, identity: Identity
+    ) -> tuple[Entry, bool]:
+        author, stream = entered.author, stream_of(entered.entry)
+        kept = QueueStartKept(text_of(request.start))
+        async with self._entering:
+            known = await self._known(request, author)
+            if known is not None:
+                return known, False
+            self._require_capacity(author)
+            with anyio.CancelScope(shield=True):
+                try:
+                    drafts = [draft_of(entered, author.id), draft_of(kept, author.id)]
+                    await self._journal.append(stream, drafts, expected=0)
+                except Refused:
+                    self._tasks.start_soon(self._disown, stream)
+                    raise
+                entry = Entry(entered)
+                entry.by = (author, identity)
+                self._entries.append(entry)
+                self._survey()
+                self._changed()
+        return entry, True
+
+    async def _disown(self, stream: str) -> None:
+        """Store that an entry has left, in case it was committed although the answer got lost."""
+        while True:
+            try:
+                if await self._journal.newest(stream):
+                    left = QueueLeft(at=self._clock_us())
+                    await self._journal.append(stream, [draft_of(left)])
+                return
+            except Refused:
+                await anyio.sleep(_STORE_S)
+
+    async def _known(self, request: QueueRequest, author: Author) -> Entry | None:
+        """Return the entry that a request has become; None if it has become none yet. Raise Conflict if
+        its request id belongs to another one, or to one that has left the queue."""
+        id_ = entry_id(request.start.request_id)
+        found = next((each for each in self._entries if each.id == id_), None)
+        where: dict[str, object] = {"path": "/start/request_id"}
+        if found is None:
+            if await self._journal.read(stream_of(id_), limit=1):
+                raise Conflict("What this request_id put into the queue has left it.", where=where)
+            return None
+        if (found.entered.order, found.entered.author.id) != (order_of(request), author.id):
+            raise Conflict("This request_id belongs to another entry of the queue.", where=where)
+        return found
+
+    def _require_capacity(self, author: Author) -> None:
+        own = sum(each.entered.author.id == author.id for each in self._entries)
+        if len(self._entries) >= MOST:
+            raise Conflict(f"{MOST} starts wait already. Remove one of them first.")
+        if own >= MOST_OF_ONE:
+            raise Conflict(f"{MOST_OF_ONE} starts of yours wait already. Remove one of them first.")
+
+    async def move(self, id_: str, asked: MoveRequest, author: Author, identity: Identity) -> None:
+        """Move an entry. Whoever put it there may move it back, and before others of theirs; an owner
+        anywhere. Raise NotFound if it does not wait, Forbidden if the person may not, Unavailable if it
+        cannot be stored."""
+        entry = self.find(id_)
+        after = self.find(asked.before) if asked.before else None
+        self._require_own(entry, identity, "move")
+        others = [each for each in self._entries if each is not entry]
+        place = others.index(after) if after is not None and after in others else len(others)
+        if after is entry:
+            return
+        if identity.person.role != OWNER:
+            passed = others[place : self._entries.index(entry)]
+            strangers = (each for each in passed if each.entered.author.id != author.id)
+            for each in strangers:
+                if not set(each.lanes).isdisjoint(entry.lanes):
+                    who = each.entered.author.name or "somebody"
+                    raise Forbidden(f"That would go before the start of {who}: an owner may do it.")
+        order = [*others[:place], entry, *others[place:]]
+        event = QueueMoved(
+            at=self._clock_us(), author=author, order=tuple(each.id for each in order)
+        )
+        with anyio.CancelScope(shield=True):
+            await self._journal.append(stream_of(entry.id), [draft_of(event, author.id)])
+            ranks = {each: rank for rank, each in enumerate(event.order)}
+            self._entries.sort(key=lambda each: ranks.get(each.id, len(ranks)))
+            self._survey()
+            self._changed()
+
+    async def remove(self, id_: str, author: Author, identity: Identity) -> None:
+        """Take an entry out of the queue. Raise NotFound if it does not wait, Forbidden if it is that of
+        somebody else and the person is no owner, Unavailable if it cannot be stored."""
+        entry = self.find(id_)
+        self._require_own(entry, identity, "remove")
+        async with entry.turn:
+            self.find(id_)
+            event = QueueLeft(at=self._clock_us(), by=author)
+            await self._journal.append(stream_of(id_), [draft_of(event, author.id)])
+            self._forget(entry)
+
+    def _require_own(self, entry: Entry, identity: Identity, what: str) -> None:
+        if identity.person.role != OWNER and entry.entered.author.id != identity.person.id:
+            who = entry.entered.author.name or "somebody else"
+            raise Forbidden(f"{who} put this into the queue: they may {what} it, and owners may.")
+
+    def _forget(self, entry: Entry) -> None:
+        if entry in self._entries:
+            self._entries.remove(entry)
+            self._drop_empty()
+            self._survey()
+            self._changed()
+
+    # --- whose turn it is ---------------------------------------------------------------------
+
+    def _survey(self) -> None:
+        """Say anew of each entry why it waits. One that waits for a closed queue keeps nobody waiting."""
+        if not self._entries:
+            return
+        ahead: dict[str, int] = {}
+        busy = {lane: tuple(self._busy(lane)) for lane in self._lanes}
+        is_changed = False
+        for entry in tuple(self._entries):
+            closed = [
+                Waiting(name, "closed") for name in entry.lanes if not self._lanes[name].is_open
+            ]
+            waits = list(closed)
+            for name in entry.lanes:
+                if not closed:
+                    if behind := ahead.get(name, 0):
+                        waits.append(Waiting(name, "behind", behind=behind))
+                    ahead[name] = behind + 1
+                waits += busy[name]
+            if entry.waits != tuple(waits) or (entry.ready_at is None) == (not waits):
+                is_changed = True
+                entry.waits = tuple(waits)
+                was_ready, entry.ready_at = entry.ready_at, None
+                if not waits:
+                    entry.ready_at = was_ready or self._clock_us()
+                    if was_ready is None:
+                        self._tasks.start_soon(self._turn_came, entry, entry.ready_at)
+        if is_changed:
+            self._changed()
+
+    def _busy(self, name: str) -> Iterator[Waiting]:
+        """Yield why a robot is not free, whatever waits for it."""
+        if name == SIMULATOR:
+            lane = self._lanes[name]
+            for run in sorted(filter(lane.owns, self._going))[:1]:
+                yield Waiting(name, "run", run)
+            return
+        occupying = self._control.occupying(name)
+        if occupying is not None:
+            yield Waiting(name, "run", occupying.id)
+        elif self._control.foreign_stops.is_stopping(name):
+            yield Waiting(name, "stop")
+
+    async def _turn_came(self, entry: Entry, ready_at: int) -> None:
+        """Look before the start, tell people, and start an entry that starts by itself."""
+        entered = entry.entered
+        if entered.robots:
+            event = QueueReady(
+                at=ready_at,
+                person=entered.author.name,
+                graph=entered.graph,
+                graph_name=entered.graph_name,
+                robots=entered.robots,
+            )
+            try:
+                await self._journal.append(stream_of(entry.id), [draft_of(event)])
+            except Refused:
+                log.exception("it could not be stored that it is the turn of %s", entry.id)
+        by = entry.by
+        identity = None if by is None else self._control.rights.current(by[1])
+        try:
+            if by is None or identity is None:
+                raise Forbidden(f"{entered.author.name or 'Its person'} is not signed in any more.")
+            start = await self._start_in(entry, {})
+            look, _ = await self._look(start, entered.seen, identity)
+            found = look.differs
+        except Refused as refused:
+            found = (refused.detail,)
+        if entry.ready_at != ready_at or entry not in self._entries:
+            return
+        entry.differs = found
+        self._changed()
+        if entered.by_itself and not found and by is not None and identity is not None:
+            await self._start_by_itself(entry, start, ready_at, by[0], identity)
+
+    async def _start_by_itself(
+        self, entry: Entry, start: StartRequest, ready_at: int, author: Author, identity: Identity
+    ) -> None:
+        async with entry.turn:
+            if entry.ready_at != ready_at or entry not in self._entries:
+                return
+            denied = may(identity, "simulate", now=self._clock_us() / 1e6)
+            try:
+                if isinstance(denied, Denied):
+                    raise Forbidden(denied.reason)
+                await self._start(entry, start, author, identity)
+            except Refused as refused:
+                for lane in [self._lanes[name] for name in entry.lanes if name in self._lanes]:
+                    self._doubts.meet(lane, Doubt("refused", refused.detail))
+
+    # --- start --------------------------------------------------------------------------------
+
+    async def start(
+        self, id_: str, asked: TurnRequest, author: Author, identity: Identity
+    ) -> Started:
+        """Start an entry whose turn it is, and return its run; that of one which was started before is
+        returned as it is. Raise Conflict if it has to wait, or is not as it was looked at, NotFound if
+        it was removed, and what a start raises."""
+        entry = next((each for each in self._entries if each.id == id_), None)
+        if entry is None:
+            return await self._started(id_)
+        async with entry.turn:
+            if entry not in self._entries:
+                return await self._started(id_)
+            self._require_turn(entry)
+            start = await self._start_in(entry, asked.watching)
+            look, _ = await self._look(start, entry.entered.seen, identity)
+            if look.digest != asked.look:
+                text = "It is not as you have looked at it. Look again."
+                if look.differs:
+                    text += f" Since it was put into the queue: {' '.join(look.differs[:3])}"
+                raise Conflict(text, where={"path": "/look", "differs": list(look.differs)})
+            return await self._start(entry, start, author, identity)
+
+    async def _start(
+        self, entry: Entry, start: StartRequest, author: Author, identity: Identity
+    ) -> Started:
+        """Start an entry. Nothing waits between the look at the queue and the start, which takes note
+        of the Stops pressed so far in that same step."""
+        self._require_turn(entry)
+        started = await self._control.start(start, author, identity)
+        self._leave(entry, started.run)
+        return started
+
+    def _require_turn(self, entry: Entry) -> None:
+        """Raise Conflict if an entry has to wait."""
+        self._survey()
+        for each in entry.waits:
+            closed = self._lanes[each.robot].closed if each.why == "closed" else None
+            where: dict[str, object] = {"robot": each.robot, "why": each.why}
+            if closed is not None:
+                text = f"The queue of {each.robot} is closed. {closed.text}"
+                raise Conflict(text, where=where | {"closing": closing_of(closed)})
+            if each.why == "behind":
+                raise Conflict(f"{each.behind} before it wait for {each.robot}.", where=where)
+            raise Conflict(f"{each.robot} is not free.", where=where)
+
+    async def _started(self, id_: str) -> Started:
+        """Return the run that an entry has become. Raise NotFound if it has become none."""
+        rows = await self._journal.query(queries.by_request(request_of(id_)))
+        if not rows:
+            raise NotFound("This is not in the queue: it was removed, or never was.")
+        return Started(await self._control.find(rows[0].id), fresh=False)
+
+    def _leave(self, entry: Entry, run: Run) -> None:
+        """Take out an entry that has become a run, in this step, and store that."""
+        if entry not in self._entries:
+            return
+        self._robots_of.put(run.id, frozenset(entry.lanes))
+        event = QueueLeft(at=self._clock_us(), run=run.id)
+        self._tasks.start_soon(self._store, stream_of(entry.id), event)
+        self._forget(entry)
+
+    async def _store(self, stream: str, event: StoredKind, author: str = "") -> None:
+        while True:
+            try:
+                await self._journal.append(stream, [draft_of(event, author)])
+                return
+            except Refused:  # it has happened in any case, and a restart finds the same
+                await anyio.sleep(_STORE_S)
+
+    # --- close and open -----------------------------------------------------------------------
+
+    def _lane(self, name: str) -> Lane:
+        """Return the queue of a robot. One in which nothing waited is open: whoever puts the first start
+        into it has looked."""
+        lane = self._lanes.get(name)
+        if lane is None:
+            lane = self._lanes[name] = Lane(name, self._robots_of)
+            self._doubts.begin(lane)
+        return lane
+
+    def _drop_empty(self) -> None:
+        used = {name for each in self._entries for name in each.lanes}
+        for name, lane in tuple(self._lanes.items()):
+            if name not in used and not lane.entering:
+                del self._lanes[name]
+
+    def close(self, robot: str, author: Author) -> None:
+        """Close the queue of a robot in the name of a person; no run is stopped by it. Raise NotFound if
+        nothing waits for it."""
+        who = author.name or "Somebody"
+        self._doubts.meet(self._of(robot), Doubt("person", f"{who} closed the queue.", author))
+
+    def _of(self, robot: str) -> Lane:
+        lane = next((each for each in self.lanes if each.name == robot), None)
+        if lane is None:
+            raise NotFound(f"Nothing waits for {robot}.")
+        return lane
+
+    def _close(self, lane: Lane, doubt: Doubt) -> None:
+        lane.is_open = False
+        event = QueueClosed(
+            at=self._clock_us(), why=doubt.why, text=doubt.text, by=doubt.by, run=doubt.run
+        )
+        lane.closed = event
+        by = doubt.by.id if doubt.by is not None else ""
+        self._tasks.start_soon(self._store, stream_of_robot(lane.name), event, by)
+        for entry in self._entries:
+            if doubt.by is not None and lane.name in entry.lanes and entry.turn.locked():
+                self._control.hold_back(request_of(entry.id), doubt.by)
+        self._survey()
+        self._changed()
+
+    async def open(
+        self, robot: str, asked: OpenQueueRequest, author: Author, identity: Identity
+    ) -> None:
+        """Open the closed queue of a robot again, after a pre-flight of its first entry that blocks
+        nothing there. On robots nothing is started. Raise NotFound if nothing waits for it, Conflict if
+        it was closed again since the person looked, or something is in doubt, Unavailable if it cannot
+        be stored."""
+        lane = self._of(robot)
+        if lane.closed is None:
+            raise Conflict(f"The queue of {robot} is open.")
+        closed, before = lane.closed, lane.doubts
+        if asked.closing != closing_of(closed):
+            where: dict[str, object] = {"path": "/closing", "closing": closing_of(closed)}
+            raise Conflict(f"It was closed again meanwhile. {closed.text}", where=where)
+        self._require_settled(robot)
+        entry = self._first_seen(lane, identity)
+        start = await self._start_in(entry, {})
+        look, _ = await self._look(start, entry.entered.seen, identity)
+        require_openable(start, look.looks, robot)
+        event = QueueOpened(at=self._clock_us(), author=author)
+        with anyio.CancelScope(shield=True):
+            await self._journal.append(stream_of_robot(robot), [draft_of(event, author.id)])
+            if lane.closed is not closed or lane.doubts != before or self._lanes.get(robot) != lane:
+                if lane.closed is not None:
+                    self._tasks.start_soon(self._store, stream_of_robot(robot), lane.closed)
+                raise Conflict("It was opened or closed meanwhile. Look again.")
+            lane.closed = None
+            self._doubts.begin(lane)
+            if robot == SIMULATOR:
+                for each in self._entries:
+                    if each.by is None and robot in each.lanes:
+                        each.by = (author, identity)
+            self._survey()
+            self._changed()
+
+    def _require_settled(self, robot: str) -> None:
+        """Raise Conflict while a run on a robot is being stopped, or is lost."""
+        run = None if robot == SIMULATOR else self._control.occupying(robot)
+        if run is not None and (run.desired == "stopped" or run.lost or run.unconfirmed):
+            text = f"Run {run.number} on {robot} is not known to be at rest."
+            raise Conflict(text, where={"run": run.id})
+
+    def _first_seen(self, lane: Lane, identity: Identity) -> Entry:
+        """Return the first entry of a queue that a person may see. Raise Forbidden if there is none."""
+        unseen = self._control.sight.unseen(identity)
+        for entry in self._entries:
+            if lane.name in entry.lanes and (unseen is None or not unseen.hides(entry.graphs)):
+                return entry
+        raise Forbidden(
+            "You may see no graph that waits there, so you cannot look before the start."
+        )
+
+    def _run_changed(self, opened: OpenRun) -> None:
+        run = opened.run
+        if opened.is_led:  # a piece is a part of its run
+            return
+        is_news = (run.id in self._going) == (run.end is not None)
+        (self._going.discard if run.end is not None else self._going.add)(run.id)
+        for id_ in filter(None, (run.id, run.group) if run.robots else ()):
+            known = self._robots_of.get(id_) or frozenset()
+            self._robots_of.put(id_, known.union(run.robots))
+        entry = next((e for e in self._entries if request_of(e.id) == run.request_id), None)
+        if entry is not None:
+            self._leave(entry, run)
+        self._doubts.look_at(run)
+        if is_news:
+            self._survey()
+            self._drop_empty()
+
+    # --- restart ------------------------------------------------------------------------------
+
+    async def _load(self) -> None:
+        """Read the entries that an earlier process left, and close their queues. One of which a run was
+        made has left the queue, even if that could not be stored."""
+        for opened in self._control.shown.values():
+            self._run_changed(opened)
+        for row in await self._journal.query(queries.waiting(QueueStartKept.kind, QueueLeft.kind)):
+            if row.kind == QueueEntered.kind:
+                try:
+                    self._entries.append(Entry(msgspec.json.decode(row.body, type=QueueEntered)))
+                except msgspec.DecodeError:
+                    log.exception("%s cannot be read", row.stream)
+        for entry in tuple(self._entries):
+            rows = await self._journal.query(queries.by_request(request_of(entry.id)))
+            if rows:
+                self._entries.remove(entry)
+                event = QueueLeft(at=self._clock_us(), run=rows[0].id)
+                self._tasks.start_soon(self._store, stream_of(entry.id), event)
+        for row in await self._journal.query(queries.newest_move(QueueMoved.kind)):
+            order = msgspec.json.decode(row.body, type=QueueMoved).order
+            ranks = {each: rank for rank, each in enumerate(order)}
+            self._entries.sort(key=lambda each: ranks.get(each.id, len(ranks)))
+        names = {name for each in self._entries for name in each.lanes}
+        for lane in [self._lane(name) for name in sorted(names)]:
+            self._doubts.meet(lane, Doubt("restart", _RESTARTED))
+
+
+def closing_of(closed: QueueClosed) -> str:
+    """Return the name of the closing of a queue, by which a person says which one they saw."""
+    return str(closed.at)
+
+
+def _kept_in(events: list[Event]) -> StartRequest:
+    kept = next((each.body for each in events if each.kind == QueueStartKept.kind), b"")
+    try:
+        return start_of(msgspec.json.decode(kept, type=QueueStartKept).start)
+    except msgspec.DecodeError as damaged:
+        raise Unavailable("The start of this entry cannot be read.") from damaged
