@@ -8,7 +8,7 @@ from typing import Final, TypeVar, cast
 import msgspec
 from anyio import CapacityLimiter
 
-from action_assistant.web.workers.lanes import Lane, kept_warm, start_fork_server
+from action_assistant.web.workers.lanes import Lane, opened, start_fork_server
 
 T = TypeVar("T")
 
@@ -53,9 +53,9 @@ class EditorWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[EditorWorkers]":
-        """Return a context with the lanes, during which their worker processes are kept ready."""
+        """Return a context with the lanes, whose worker processes are made when they are needed."""
         lanes = cls()
-        async with kept_warm(lanes.files, lanes.graphs, lanes.edits):
+        async with opened(lanes.files, lanes.graphs, lanes.edits):
             yield lanes
 
 

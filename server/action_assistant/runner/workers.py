@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from anyio import CapacityLimiter
 
 from action_assistant.web.workers import lanes as workers
-from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
+from action_assistant.web.workers.lanes import Crashed, Lane, opened
 
 if TYPE_CHECKING:  # not on Windows
     from multiprocessing.context import ForkServerProcess
@@ -45,10 +45,9 @@ class RunnerWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[RunnerWorkers]":
-        """Return a context with the pools, in which workers are kept running. The first processes
-        are made soon after its beginning."""
+        """Return a context with the pools, whose workers are made when they are needed."""
         lanes = cls()
-        async with kept_warm(lanes.starts, lanes.looks, lanes.ours):
+        async with opened(lanes.starts, lanes.looks, lanes.ours):
             yield lanes
 
 

@@ -1,4 +1,4 @@
-"""Workers are there before they are needed, and never in the way of a start."""
+"""Workers are made when they are needed, and end when nothing is left to do."""
 
 import os
 import subprocess
@@ -9,58 +9,64 @@ from pathlib import Path
 from typing import Any, Final
 
 import anyio
+import psutil
 import pytest
 from anyio import CapacityLimiter
 
 from action_assistant.web.workers import lanes
-from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
-
-
-class Watched(Lane):
-    """Tells how often a worker is made ready without being asked for, and how often it was."""
-
-    begun = warmed = 0
-
-    async def warm(self) -> None:
-        self.begun += 1
-        await super().warm()
-        self.warmed += 1
+from action_assistant.web.workers.lanes import Crashed, Lane, opened
+from web.workers.worker_looks import slept
 
 
 @pytest.fixture
-def lane() -> Iterator[Watched]:
-    made = Watched("try", 1, 30, 0, CapacityLimiter(4), ())
+def lane() -> Iterator[Lane]:
+    made = Lane("try", 1, 30, 0, CapacityLimiter(4), ())
     yield made
     made.close()
 
 
-async def test_a_start_makes_none(lane: Watched) -> None:
-    async with kept_warm(lane):
+async def test_a_pool_at_rest_has_no_worker_and_one_with_work_keeps_its_worker(
+    lane: Lane, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    born = 0
+    child = lanes.child
+
+    def counted(*args: Any, **more: Any) -> Any:
+        nonlocal born
+        born += 1
+        return child(*args, **more)
+
+    monkeypatch.setattr(lanes, "child", counted)
+    async with opened(lane):
         await anyio.sleep(0.2)
-    assert lane.begun == 0
+        assert born == 0
+        assert await lane(os.getpid) == await lane(os.getpid)
+        assert born == 1
 
 
-async def test_a_worker_is_warmed_without_any_request(
-    lane: Watched, monkeypatch: pytest.MonkeyPatch
+async def test_a_worker_without_work_is_ended_after_a_while_and_the_next_request_gets_another(
+    lane: Lane, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lanes, "_FIRST_S", 0.01)
-    async with kept_warm(lane):
+    monkeypatch.setattr(lanes, "_IDLE_S", 0.1)
+    async with opened(lane):
+        first = await lane(os.getpid)
         with anyio.fail_after(60):
-            while not lane.warmed:  # noqa: ASYNC110 - nobody tells
+            while psutil.pid_exists(first):  # noqa: ASYNC110 - nobody tells
                 await anyio.sleep(0.01)
-
-
-async def test_a_request_before_the_warm_up_gets_a_worker(
-    lane: Watched, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(lanes, "_FIRST_S", 600)  # a new process may take longer than 2 s
-    async with kept_warm(lane):
         assert await lane(add, 2, 3) == 5
-    assert lane.begun == 0
+    assert lane.deaths == 0
+
+
+async def test_a_worker_that_works_for_long_is_not_ended_as_one_without_work(
+    lane: Lane, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lanes, "_IDLE_S", 0.05)
+    async with opened(lane):
+        assert await lane(slept, 0.5) == 0.5
 
 
 async def test_a_worker_that_dies_before_its_first_work_counts_as_a_death(
-    lane: Watched, monkeypatch: pytest.MonkeyPatch
+    lane: Lane, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its number is written to it when it is made: there the one who makes it finds it gone."""
 

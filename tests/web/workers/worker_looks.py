@@ -3,6 +3,7 @@
 import gc
 import os
 import sys
+import time
 from pathlib import Path
 
 
@@ -27,3 +28,9 @@ def forget() -> None:
     """Drop the sockets that the program had when it forked the process that forked this one."""
     vars(sys.modules["__main__"])["held"].clear()
     gc.collect()
+
+
+def slept(seconds: float) -> float:
+    """Take some time, and return it."""
+    time.sleep(seconds)
+    return seconds

@@ -9,8 +9,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from contextvars import ContextVar
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Final
 
 import h11
@@ -337,6 +338,30 @@ class _Server(uvicorn.Server):
         self._connections = connections
         self._publish = publish
         self._published = ExitStack()
+        self._ends: Final = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Take up a signal that ends the server. Python calls this between two of its steps."""
+        super().handle_exit(sig, frame)
+        self.end()
+
+    def end(self) -> None:
+        """Let the server shut down. Any thread may call this, and a signal handler."""
+        self.should_exit = True
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._ends.set)
+
+    async def main_loop(self) -> None:
+        """Keep the header with the date right until the server is to end. uvicorn looks for that
+        ten times a second, which is half of what a process does at rest."""
+        self._loop = asyncio.get_running_loop()
+        seconds = 0
+        while not await self.on_tick(10 * seconds):  # uvicorn counts tenths
+            seconds += 1
+            with suppress(TimeoutError):
+                async with asyncio.timeout(1):
+                    await self._ends.wait()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Run the startup of the application, then accept connections on `sockets` by `Connections`
@@ -403,7 +428,7 @@ def _shorten_error(record: logging.LogRecord) -> bool:
     return True
 
 
-def _end_with_parent(server: uvicorn.Server) -> None:
+def _end_with_parent(server: _Server) -> None:
     """Let `server` shut down when the process that started it dies, for any reason: its end of a
     pipe closes then. A daemon thread watches that."""
     descriptor = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
@@ -413,6 +438,6 @@ def _end_with_parent(server: uvicorn.Server) -> None:
     def wait() -> None:
         with os.fdopen(int(descriptor), "rb") as pipe:
             pipe.read()
-        server.should_exit = True
+        server.end()
 
     threading.Thread(target=wait, name="parent", daemon=True).start()

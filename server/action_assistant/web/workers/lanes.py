@@ -17,6 +17,7 @@ import pickle
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
@@ -46,7 +47,7 @@ __all__ = [
     "OutOfTime",
     "RunInWorker",
     "child",
-    "kept_warm",
+    "opened",
     "run_here",
     "start_fork_server",
 ]
@@ -62,7 +63,7 @@ LAST: Final = b"."  # this worker does nothing more
 _WAITING: Final = 32  # requests of one person
 _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
-_FIRST_S: Final = 2.0  # after the start, which has enough to do by itself
+_IDLE_S: Final = 300.0  # without work, after which a worker is ended
 _ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
 _ORPHANED: Final = 64  # exit code of a process whose parent has ended
 _DIED: Final = "The process that worked on this has died; nothing came of it."
@@ -109,12 +110,13 @@ def _forked(path: bytes, args: Sequence[Any], passfds: Sequence[int]) -> int:
     """Do in a fork of this process what the interpreter at `path` would do for `-c` among `args`,
     with no files of this process but `passfds` and the standard ones. Return the number of the
     process."""
+    gc.collect()
+    gc.freeze()  # in this process, too: its garbage collector writes to no page that both share
     process = os.fork()
     if process:
         return process
     try:
         _let_go_of_files(passfds)
-        gc.freeze()  # pages that nobody writes to stay shared
         gc.enable()
         exec(args[-1], {})  # a line that `multiprocessing` writes
     except SystemExit:
@@ -378,6 +380,7 @@ class Lane:
         finally:
             self._busy.discard(worker)
             if finished:
+                worker.used_at = time.monotonic()
                 self._idle.append(worker)
             else:
                 worker.kill()
@@ -398,10 +401,11 @@ class Lane:
         """The number of requests without an answer, including the ones that are worked on."""
         return sum(self._waiting.values())
 
-    async def warm(self) -> None:
-        """Start a worker if none is ready or busy."""
-        if not self._idle and not self._busy:
-            self._idle.append(await self._hired())
+    def retire(self, before: float) -> None:
+        """End the workers that have had nothing to do since `before`, by the monotonic clock."""
+        for worker in [each for each in self._idle if each.used_at < before]:
+            self._idle.remove(worker)
+            worker.kill()
 
     async def _hired(self) -> "_Worker":
         try:
@@ -429,30 +433,24 @@ class Lane:
 
 
 @asynccontextmanager
-async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
-    """Return a context in which a worker of each pool is kept ready. The first ones are started
-    soon after its beginning; all workers are killed at its end."""
-    tasks = [asyncio.create_task(_keep_warm(lane)) for lane in lanes]
+async def opened(*lanes: Lane) -> AsyncIterator[None]:
+    """Return a context in which pools make workers as they need them, and end those that had
+    nothing to do for some minutes. All workers are killed at its end."""
+    retiring = asyncio.create_task(_retire_idle(lanes))
     try:
         yield
     finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.wait(tasks)
+        retiring.cancel()
+        await asyncio.wait([retiring])
         for lane in lanes:
             lane.close()
 
 
-async def _keep_warm(lane: Lane) -> None:
-    """Keep one worker of a pool ready until cancelled, so that the next request does not wait for a
-    new process."""
-    await anyio.sleep(_FIRST_S)
+async def _retire_idle(lanes: Sequence[Lane]) -> None:
     while True:
-        try:
-            await lane.warm()
-        except Crashed as error:
-            log.error("%s", error.detail)
-        await anyio.sleep(0.5)
+        await anyio.sleep(_IDLE_S / 5)
+        for lane in lanes:
+            lane.retire(time.monotonic() - _IDLE_S)
 
 
 class _Worker:
@@ -461,6 +459,7 @@ class _Worker:
     def __init__(self, process: "ForkServerProcess", wire: Connection) -> None:
         self._process = process
         self._wire = wire
+        self.used_at = time.monotonic()  # when it was born, or answered last
 
     @classmethod
     def born(cls, name: str, nice: int, preloaded: Sequence[str]) -> "_Worker":
