@@ -247,3 +247,25 @@ test("no dialog lies under STOP, however tall it is, on a phone held either way"
   }
   await context.close();
 });
+
+test("a turned phone keeps the look before a start, with what was chosen", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Mari", PHONE);
+  const id = await product.chain(3);
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).tap();
+  const look = page.getByRole("dialog");
+  await look.getByRole("checkbox", { name: "Repeat it" }).check();
+  for (const viewport of [
+    { width: 844, height: 390 },
+    { width: 1200, height: 800 },
+    PHONE.viewport,
+  ]) {
+    await page.setViewportSize(viewport);
+    await expect(look.getByRole("checkbox", { name: "Repeat it" })).toBeChecked();
+  }
+  await page.keyboard.press("Escape");
+  await expect(look).toHaveCount(0);
+  expect(failures).toEqual([]);
+  await context.close();
+});

@@ -30,7 +30,7 @@ import { askedDryRun, useReplay } from "../review/replay";
 import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import type { Waits } from "../runs/sent-graph";
-import { StartControl } from "../runs/start/start-control";
+import { StartControl, StartLook, useStartLook } from "../runs/start/start-control";
 import type { Unsure } from "../status/progress";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
 import { useUnsure } from "../status/silence";
@@ -178,6 +178,7 @@ function Inside({ id }: { id: string }) {
   useNameColors(NAME_RANK.actors, robotNames(graph.actions));
   const seed = useSeed(runner, askedDryRun(useSearch()), graph, begun);
   const mayStart = useMay("simulate");
+  const look = useStartLook(id);
   const gone = useLinkPart(
     ({ state, why, seq }) => state === "refused" && why === "no-such-graph" && seq === 0,
   );
@@ -206,7 +207,7 @@ function Inside({ id }: { id: string }) {
         Bar={TitledBar}
         list={<Lists create={create} choose={choose} />}
         status={<Draft run={inside === null ? live : null} label={label} settle={settle} />}
-        start={mayStart && <Start settle={settle} />}
+        start={mayStart && <Start settle={settle} look={look} />}
         record={mayStart && <Record />}
         begin={mayStart && <Begin settle={settle} run={run} />}
         strip={
@@ -223,6 +224,7 @@ function Inside({ id }: { id: string }) {
         held={live?.ended_at === null && <Held run={live} past={past} />}
         corner={<Corner run={live} whose={going.length > 1} />}
       />
+      {mayStart && <StartLook graph={id} name={graph.name || "untitled"} look={look} />}
     </>
   );
 }
@@ -239,11 +241,10 @@ function Draft(props: Settled & Pick<ComponentProps<typeof DraftStatus>, "run" |
   return <DraftStatus {...props} graph={graph} seq={seq} obstacle={obstacle} />;
 }
 
-function Start({ settle }: Settled) {
+function Start({ settle, look }: Settled & Pick<ComponentProps<typeof StartControl>, "look">) {
   const { id, graph, seq, obstacle, asks, compact, phone } = useEditorSummary();
-  const name = graph.name || "untitled";
   const more = { asks: asks !== "" || graph.actions.some(isReadyMade), compact, thumb: phone };
-  return <StartControl {...{ graph: id, name, seq, settle, obstacle, ...more }} />;
+  return <StartControl {...{ graph: id, seq, settle, obstacle, look, ...more }} />;
 }
 
 /** The look before a run of a part of the graph. */

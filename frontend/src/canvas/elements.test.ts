@@ -13,6 +13,7 @@ import {
 import { meaning } from "../graph/meaning";
 import { ENTRY, EXIT, type Graph } from "../graph/model";
 import { readGraph } from "../graph/read";
+import type { Progress } from "../status/progress";
 import {
   edgesOf,
   keepEqual,
@@ -58,6 +59,22 @@ test("each outcome with a response has its own arrow from its own handle", () =>
     ["on_error", b],
   ]);
   expect(arrows.map((edge) => edge.data?.answers !== null)).toEqual([true, false, false]);
+});
+
+test("an arrow is a ghost where only the run that is compared went that way", () => {
+  const { graph, a } = drawn();
+  const around = surroundingsOf(graph, null);
+  const progress = new Map([[a, { tone: "true" } as Progress]]);
+  const ghostsOf = (end: string) =>
+    edgesOf(graph, { ...options(graph), progress, ghosts: new Map([[a, end]]) }, around)
+      .filter((edge) => edge.source === a)
+      .map((edge) => [edge.data?.came, edge.data?.ghost ?? false]);
+  expect(ghostsOf("error")).toEqual([
+    ["on_true", false],
+    ["on_true", false],
+    [null, true],
+  ]);
+  expect(ghostsOf("false").every(([, ghost]) => ghost === false)).toBe(true);
 });
 
 test("outcomes with the same response share a pill", () => {

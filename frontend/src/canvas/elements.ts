@@ -90,6 +90,8 @@ export type Arrow = Edge<
     came: Precondition | null;
     /** The parent has ended with an outcome that is not in this bundle. */
     passed: boolean;
+    /** Only the other run, which is compared with this one, went this way. */
+    ghost?: boolean;
     /** Its two robots, where it leads from an action of one to an action of another. */
     hand: HandOver | null;
     /** True if it starts at a folded frame, which has no handles for single outcomes. */
@@ -127,7 +129,10 @@ export interface NodeOptions {
   expanded?: Sizes | undefined;
 }
 
-export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks">;
+export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks"> & {
+  /** With what each action ended in another run that is compared with this one. */
+  ghosts?: ReadonlyMap<Key, string> | undefined;
+};
 
 /** The sides at which arrows leave and enter cards, by direction. */
 const SIDES = {
@@ -366,6 +371,8 @@ function arrowsOf(
     drawnBundles.add(bundle.id);
     const hand = handOf(bundle);
     const came = entry ? null : (bundle.outcomes.find((each) => each === ended) ?? null);
+    const other = `on_${options.ghosts?.get(relation.parent)}`;
+    const ghost = !entry && came === null && bundle.outcomes.some((each) => each === other);
     const over = !entry && OUTCOMES.some((each) => each === ended);
     return {
       id: `${id}|${outcome}`,
@@ -386,6 +393,7 @@ function arrowsOf(
         mark: i === 0 ? mark : null,
         lit: isLit(relation, outcome, options),
         passed: over && came === null,
+        ...(ghost ? { ghost } : {}),
         hand,
       },
     };

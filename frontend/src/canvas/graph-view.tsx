@@ -20,6 +20,8 @@ interface Props {
   graph: Graph;
   progress: ReadonlyMap<Key, Progress>;
   selected?: ReadonlySet<string>;
+  /** With what each action ended in the run that is compared with this one. */
+  ghosts?: ReadonlyMap<Key, string>;
   label: string;
   onSelect?: (key: Key | null) => void;
   /** Called with the id of a relation; without it arrows cannot be chosen. */
@@ -38,7 +40,7 @@ const LARGE = 150; // cards; beyond this number, cards out of sight are not rend
 
 export function GraphView(props: Props) {
   const { graph, progress, selected = NONE, label, onSelect, led = false, onPanned } = props;
-  const { onSelectArrow } = props;
+  const { onSelectArrow, ghosts } = props;
   useNameColors(NAME_RANK.actors, robotNames(graph.actions));
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
   const laidOut = useLaidOut(graph);
@@ -47,8 +49,8 @@ export function GraphView(props: Props) {
     [graph, laidOut],
   );
   const options = useMemo(
-    () => ({ places, selected, progress, marks: NO_PROBLEM_MARKS, measured }),
-    [places, selected, progress, measured],
+    () => ({ places, selected, progress, marks: NO_PROBLEM_MARKS, measured, ghosts }),
+    [places, selected, progress, measured, ghosts],
   );
   const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);
   const edges = useMemo(

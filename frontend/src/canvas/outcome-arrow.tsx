@@ -124,8 +124,9 @@ function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { 
         style={{
           stroke: TIPS[tone],
           strokeWidth: lit || change ? 2.75 : selected ? 2.5 : 1.8,
-          ...(data.passed ? { opacity: 0.38 } : {}),
+          ...(data.passed && !data.ghost ? { opacity: 0.38 } : {}),
           ...(data.bundle.optional ? { strokeDasharray: "5 4" } : {}),
+          ...(data.ghost ? { strokeDasharray: "1 5", strokeLinecap: "round", strokeWidth: 3 } : {}),
           ...(change ? CHANGED_LINES[change] : {}),
         }}
       />

@@ -37,7 +37,7 @@ import {
   valueDifferences,
 } from "./differences";
 import { GhostLanes } from "./ghost-lanes";
-import type { RunBarParts } from "./run-page";
+import { type RunBarParts, useIsPhone } from "./run-page";
 
 function Head({ run, title }: { run: Run; title: string }) {
   const by = useCurrentName(run.author);
@@ -273,30 +273,33 @@ export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode })
   const [a, b] = [query.get("a") ?? "", query.get("b") ?? ""];
   const { runner } = useLive();
   const found = useComparison(runner, a, b);
+  const isPhone = useIsPhone();
+  const actions = a !== "" && b !== "" && (
+    <>
+      <Button
+        component={Link}
+        variant="default"
+        to={`/runs/compare?${new URLSearchParams({ b, choose: "true" })}`}
+      >
+        Another run
+      </Button>
+      <Button
+        component={Link}
+        variant="default"
+        to={`/runs/compare?${new URLSearchParams({ a: b, b: a })}`}
+      >
+        Swap
+      </Button>
+    </>
+  );
   return (
     <>
       {bar({
         crumbs: [{ label: "Runs", to: "/runs" }, { label: "Compare" }],
-        actions: a !== "" && b !== "" && (
-          <>
-            <Button
-              component={Link}
-              variant="default"
-              to={`/runs/compare?${new URLSearchParams({ b, choose: "true" })}`}
-            >
-              Another run
-            </Button>
-            <Button
-              component={Link}
-              variant="default"
-              to={`/runs/compare?${new URLSearchParams({ a: b, b: a })}`}
-            >
-              Swap
-            </Button>
-          </>
-        ),
+        actions: isPhone ? null : actions,
       })}
       <main className="page">
+        {isPhone && actions && <div className={style.tools}>{actions}</div>}
         {a === "" && runner !== undefined && b !== "" && (
           <Choose key={b} runner={runner} b={b} asked={query.has("choose")} />
         )}

@@ -7,10 +7,11 @@ import type { Run } from "../api/runs";
 import { CardStateContext } from "../canvas/action-card";
 import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
+import { STATE_LETTER } from "../canvas/zoom-detail";
 import type { Tone } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
 import { useUnsure } from "../status/silence";
-import { StateLabel } from "../status/state-label";
+import { StateLabel, toneColor } from "../status/state-label";
 import { isolated } from "../words/isolated";
 import style from "./compare-page.module.css";
 import { type ActionSummary, comparedActions, outermostAid, rangeText } from "./differences";
@@ -32,6 +33,7 @@ function RunRow({ number, ghost, summary }: RowProps) {
   return (
     <span className={style.runRow}>
       <b data-ghost={ghost || undefined}>{number}</b>
+      <Sign summary={summary} />
       {summary === null ? (
         <span className={style.none}>did not run</span>
       ) : (
@@ -50,6 +52,16 @@ function RunRow({ number, ghost, summary }: RowProps) {
   );
 }
 
+/** The last result as one character, for zooms at which words are too small. */
+function Sign({ summary }: { summary: ActionSummary | null }) {
+  const tone = (summary?.results.at(-1) ?? "idle") as Tone;
+  return (
+    <i className={style.sign} style={{ color: toneColor[tone] }} aria-hidden>
+      {summary === null ? "–" : STATE_LETTER[tone]}
+    </i>
+  );
+}
+
 interface Props {
   found: Comparison;
   /** The second run, whole. */
@@ -65,12 +77,22 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
     () => new Map(comparedActions(found).map((each) => [each.aid, each])),
     [found],
   );
+  const ghosts = useMemo(
+    () =>
+      new Map(
+        [...actions].flatMap(([aid, each]) => {
+          const last = each.a?.results.at(-1);
+          return aid === null || last === undefined ? [] : [[aid, last] as const];
+        }),
+      ),
+    [actions],
+  );
   const parting = found.parting ? outermostAid(found, found.parting.step) : null;
   const stateOf = useCallback(
     (aid: string) => {
       const action = actions.get(aid);
       return (
-        <span className="stack gap-2px">
+        <span className={style.rows}>
           {aid === parting && (
             <span className={style.flag}>
               1 · first difference{found.parting?.step.levels.length ? ", inside" : ""}
@@ -91,6 +113,7 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
           graph={graph}
           progress={progress}
           selected={picked}
+          ghosts={ghosts}
           onSelect={onSelect}
           label={`Runs ${found.b.number} and ${found.a.number} of ${isolated(found.b.graph_name)}`}
         />
@@ -102,8 +125,8 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
 export function Legend({ found }: { found: Comparison }) {
   return (
     <p className={style.legend}>
-      <b>{found.b.number}</b> this run <b data-ghost>{found.a.number}</b> ghost · arrows as run{" "}
-      {found.b.number} took them
+      <b>{found.b.number}</b> this run <b data-ghost>{found.a.number}</b> ghost · strong arrows as
+      run {found.b.number} took them, dotted ones as only run {found.a.number} did
     </p>
   );
 }

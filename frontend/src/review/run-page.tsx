@@ -1,6 +1,7 @@
 /** One run: its version on the canvas, every visit on the timeline, what was said, how it ended. */
 
 import { Skeleton, Tabs } from "@mantine/core";
+import { useMediaQuery } from "@mantine/hooks";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { memo, type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
@@ -47,6 +48,11 @@ import type { RepeatActions } from "./run-menu";
 import style from "./run-page.module.css";
 import { RunParameters } from "./run-parameters";
 import { RunPrint } from "./run-print";
+
+/** On a phone the bar has no room for the actions of a page: they stand in a row below it. */
+export function useIsPhone(): boolean {
+  return useMediaQuery("(max-width: 600px)", undefined, { getInitialValueInEffect: false });
+}
 
 export interface RunBarParts {
   crumbs: readonly Crumb[];
@@ -119,7 +125,7 @@ function RunStatus({ newest, run, past }: RunStatusProps) {
     <>
       <StateLabel pill {...(past ? then : now)} />
       {past && <span className="nowrap ink3 text-xs">as it was then</span>}
-      {newest.simulated && <span className="nowrap ink3 text-xs">simulated</span>}
+      {newest.simulated && <span className="truncate ink3 text-xs">simulated</span>}
     </>
   );
 }
@@ -322,21 +328,24 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
     replay.seek(at);
     if (fact !== null) level.pick(fact);
   };
+  const isPhone = useIsPhone();
+  const actions = (
+    <>
+      <WaitButton run={newest} />
+      <PinRun runner={runner} run={newest.id} />
+      <RunActions runner={runner} run={newest} engines={engines} onStart={setAgain} />
+    </>
+  );
   return (
     <>
       {bar({
         crumbs: crumbsOf(newest),
         status: <RunStatus newest={newest} run={run} past={past} />,
-        actions: (
-          <>
-            <WaitButton run={newest} />
-            <PinRun runner={runner} run={newest.id} />
-            <RunActions runner={runner} run={newest} engines={engines} onStart={setAgain} />
-          </>
-        ),
+        actions: isPhone ? null : actions,
       })}
       <main className={style.page}>
         <div className={style.why}>
+          {isPhone && <div className={style.tools}>{actions}</div>}
           <StartedWith run={newest} />
           <Answers run={newest} />
           <RunQuestions run={newest} />

@@ -18,7 +18,6 @@ const StartDialog = lazyPart(() => import("./start-dialog").then((part) => part.
 
 interface Props {
   graph: string;
-  name: string;
   /** The moment that the page shows, as far as it has been named. */
   seq: number;
   /** The name of the moment on screen: others' edits show a little before they are named. */
@@ -30,6 +29,45 @@ interface Props {
   compact?: boolean;
   /** In two lines, within reach of a thumb. */
   thumb?: boolean;
+  look: StartLookState;
+}
+
+/**
+ * The look before a start of a graph: its moment, null while it is closed, and the chosen engines. Kept
+ * above the layouts, which change when a phone is turned: what was chosen stays.
+ */
+interface StartLookState {
+  asking: number | null;
+  setAsking: (seq: number | null) => void;
+  engines: readonly string[];
+  setEngines: (engines: readonly string[]) => void;
+}
+
+export function useStartLook(graph: string): StartLookState {
+  const [asking, setAsking] = useState<number | null>(null);
+  const [engines, setEngines] = useState<readonly string[]>(() => lastEngines(graph));
+  return { asking, setAsking, engines, setEngines };
+}
+
+/** The dialog of the look before a start, while it is open. */
+export function StartLook(props: Pick<Props, "graph" | "look"> & { name: string }) {
+  const { graph, name, look } = props;
+  const versions = useVersions(graph).data ?? [];
+  const { asking, setAsking, engines, setEngines } = look;
+  if (asking === null) return null;
+  return (
+    <OverlayBoundary>
+      <StartDialog
+        graph={graph}
+        name={name}
+        seq={asking}
+        label={nextLabel(versions, asking)}
+        chosen={engines}
+        onChosen={setEngines}
+        onClose={() => setAsking(null)}
+      />
+    </OverlayBoundary>
+  );
 }
 
 function TwoLines({ first, second }: { first: string; second: string }) {
@@ -42,12 +80,11 @@ function TwoLines({ first, second }: { first: string; second: string }) {
 }
 
 export function StartControl(props: Props) {
-  const { graph, name, seq, settle, obstacle, asks, compact = false, thumb = false } = props;
+  const { graph, seq, settle, obstacle, asks, compact = false, thumb = false } = props;
+  const { engines, setAsking } = props.look;
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
   const start = useStart(graph);
-  const [asking, setAsking] = useState<number | null>(null);
-  const [engines, setEngines] = useState(() => lastEngines(graph));
   const label = nextLabel(versions, seq);
   const goes = openRuns(now).some((run) => run.graph === graph);
   const why = start.isPending
@@ -117,19 +154,6 @@ export function StartControl(props: Props) {
       >
         <IconChevronDown size={16} aria-hidden />
       </ActionIcon>
-      {asking !== null && (
-        <OverlayBoundary>
-          <StartDialog
-            graph={graph}
-            name={name}
-            seq={asking}
-            label={nextLabel(versions, asking)}
-            chosen={engines}
-            onChosen={setEngines}
-            onClose={() => setAsking(null)}
-          />
-        </OverlayBoundary>
-      )}
     </span>
   );
 }

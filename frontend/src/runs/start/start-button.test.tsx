@@ -1,0 +1,63 @@
+// @vitest-environment jsdom
+import { MantineProvider } from "@mantine/core";
+import { act } from "react";
+import { createRoot, type Root } from "react-dom/client";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { StartButton } from "./start-button";
+
+vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
+vi.stubGlobal("matchMedia", () => ({
+  matches: false,
+  addEventListener: () => {},
+  removeEventListener: () => {},
+}));
+
+let root: Root;
+const onStart = vi.fn();
+
+beforeEach(() => {
+  onStart.mockReset();
+  root = createRoot(document.body.appendChild(document.createElement("div")));
+  act(() =>
+    root.render(
+      <MantineProvider>
+        <StartButton label="Run" name="Run v1" disabled={false} question={null} onStart={onStart} />
+      </MantineProvider>,
+    ),
+  );
+});
+
+afterEach(() => {
+  act(() => root.unmount());
+  document.body.replaceChildren();
+});
+
+/** Send an event of a finger at a time, ms; jsdom has no layout, so that the button is at 0, 0. */
+function finger(type: string, at: number, x = 0): void {
+  const event = new MouseEvent(type, { bubbles: true, cancelable: true, clientX: x });
+  Object.defineProperty(event, "timeStamp", { value: at });
+  Object.defineProperty(event, "pointerType", { value: "touch" });
+  act(() => void document.querySelector("button")?.dispatchEvent(event));
+}
+
+test("a finger that holds the button starts, once, though a browser sends no click or sends it late", () => {
+  finger("pointerdown", 1_000);
+  finger("pointerup", 1_900);
+  expect(onStart).toHaveBeenCalledTimes(1);
+  finger("click", 1_905);
+  expect(onStart).toHaveBeenCalledTimes(1);
+});
+
+test("a tap is a click and nothing else; a finger that slips off or scrolls starts nothing", () => {
+  finger("pointerdown", 1_000);
+  finger("pointerup", 1_080);
+  expect(onStart).toHaveBeenCalledTimes(0);
+  finger("click", 1_081);
+  expect(onStart).toHaveBeenCalledTimes(1);
+  finger("pointerdown", 9_000);
+  finger("pointerup", 9_900, 400);
+  finger("pointerdown", 19_000);
+  finger("pointercancel", 19_300);
+  finger("pointerup", 19_900);
+  expect(onStart).toHaveBeenCalledTimes(1);
+});
