@@ -26,7 +26,18 @@ test("neighbouring visits with the same values are one column", () => {
     action(visit({ x: "1" }), visit({ x: "1" }), visit({ x: "2" })),
   );
   expect(found.visits).toEqual(["Visits 1–2", "Visit 3"]);
-  expect(found.rows).toEqual([{ parameter: "x", sent: "1", ran: ["1", "2"] }]);
+  expect(found.rows).toEqual([{ parameter: "x", sent: "1", ran: ["1", "2"], over: [1, 1, 2] }]);
+});
+
+test("numbers that differ over three visits or more are a chart, and nothing else is", () => {
+  const over = (...texts: (string | null)[]) =>
+    parametersOfVisits({}, action(...texts.map((x) => visit(x === null ? null : { x })))).rows[0]
+      ?.over;
+  expect(over("0.5", null, "-2", "3e2")).toEqual([0.5, -2, 300]);
+  expect(over("1", "2")).toBeUndefined();
+  expect(over("1", "1", "1")).toBeUndefined();
+  expect(over("1", "2", '"3"')).toBeUndefined();
+  expect(over("1", "2", "3…")).toBeUndefined();
 });
 
 test("a value that nobody saw is not there, and is counted", () => {
@@ -49,7 +60,7 @@ test("what an action gave is shown by visit, and never as something that was sen
   const gave = (y: string): Visit => ({ ...at, outputs: { y } });
   const found = outputsOfVisits(action(gave("1"), at, gave("2"), gave("2")));
   expect(found.visits).toEqual(["Visit 1", "Visits 3–4"]);
-  expect(found.rows).toEqual([{ parameter: "y", ran: ["1", "2"] }]);
+  expect(found.rows).toEqual([{ parameter: "y", ran: ["1", "2"], over: [1, 2, 2] }]);
   expect(outputsOfVisits(action(gave("3"))).visits).toEqual(["Gave"]);
   expect(outputsOfVisits(action(at)).rows).toEqual([]);
 });

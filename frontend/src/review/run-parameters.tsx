@@ -21,12 +21,27 @@ function Value({ text, differs }: { text: string | null; differs: boolean }) {
   );
 }
 
-function Rows({ rows }: { rows: readonly ParameterRow[] }) {
+/** A number over the visits, in the room of a word; where the values say more than the last ones beside it. */
+function ValueChart({ over }: { over: readonly number[] }) {
+  const [low, high] = [Math.min(...over), Math.max(...over)];
+  const at = (value: number) => (high === low ? 9 : 17 - ((value - low) / (high - low)) * 16);
+  const points = over.map((value, i) => `${1 + (i / (over.length - 1)) * 78},${at(value)}`);
+  const words = `${over.length} visits: from ${low} to ${high}, last ${over.at(-1)}`;
+  return (
+    <svg className={style.chart} viewBox="0 0 80 18" role="img" aria-label={words}>
+      <title>{words}</title>
+      <polyline points={points.join(" ")} />
+    </svg>
+  );
+}
+
+function Rows({ rows, charts }: { rows: readonly ParameterRow[]; charts: boolean }) {
   return (
     <tbody>
       {rows.map((row) => (
         <tr key={row.parameter}>
           <th scope="row">{row.parameter.replaceAll("::", " / ")}</th>
+          {charts && <td>{row.over && <ValueChart over={row.over} />}</td>}
           {row.sent !== undefined && <Value text={row.sent} differs={false} />}
           {row.ran.map((text, i) => (
             // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
@@ -48,18 +63,20 @@ function Table({
   columns: readonly string[];
   rows: readonly ParameterRow[];
 }) {
+  const charts = rows.some((row) => row.over);
   return (
     <div className={style.scroll}>
       <table>
         <thead>
           <tr>
             <th>{title}</th>
+            {charts && <th>Over visits</th>}
             {columns.map((words) => (
               <th key={words}>{words}</th>
             ))}
           </tr>
         </thead>
-        <Rows rows={rows} />
+        <Rows rows={rows} charts={charts} />
       </table>
     </div>
   );
@@ -122,6 +139,8 @@ interface ParameterRow {
   sent?: string | null;
   /** One for each group of visits. */
   ran: readonly (string | null)[];
+  /** Its numbers, visit by visit, where there are enough of them and they differ. */
+  over?: readonly number[];
 }
 
 export interface ParametersOfVisits {
@@ -165,6 +184,20 @@ function wordsOf(group: VisitGroup, only: string | null): string {
     : `Visits ${group.first}–${group.last}`;
 }
 
+const FEWEST = 3; // visits in a chart
+
+/** Return the numbers of a parameter over the visits that reported one; nothing where a chart says no more. */
+function numbersOf(
+  action: ActionRun,
+  side: "inputs" | "outputs",
+  parameter: string,
+): Pick<ParameterRow, "over"> {
+  const texts = action.visits.flatMap((visit) => visit[side]?.[parameter] ?? []);
+  const over = texts.filter((text) => /^-?\d/.test(text)).map(Number);
+  const isChart = over.length >= FEWEST && over.every(Number.isFinite) && new Set(over).size > 1;
+  return isChart && over.length === texts.length ? { over } : {};
+}
+
 const MOST = 12; // groups of visits side by side; the newest
 
 export function parametersOfVisits(sent: ReportedValues, action: ActionRun): ParametersOfVisits {
@@ -176,6 +209,7 @@ export function parametersOfVisits(sent: ReportedValues, action: ActionRun): Par
       parameter,
       sent: sent[parameter] ?? null,
       ran: groups.map((group) => group.values[parameter] ?? null),
+      ...numbersOf(action, "inputs", parameter),
     })),
     visits: groups.map((group) => wordsOf(group, only)),
     unseen: action.visits.filter((visit) => visit.inputs == null).length,
@@ -191,6 +225,7 @@ export function outputsOfVisits(action: ActionRun): Pick<ParametersOfVisits, "ro
     rows: [...names].sort().map((parameter) => ({
       parameter,
       ran: groups.map((group) => group.values[parameter] ?? null),
+      ...numbersOf(action, "outputs", parameter),
     })),
     visits: groups.map((group) => wordsOf(group, only)),
   };
