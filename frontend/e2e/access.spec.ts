@@ -145,6 +145,10 @@ for (const scheme of ["light", "dark"] as const) {
     }
     await page.getByRole("main").waitFor();
     await look("runs");
+    await page.getByRole("button", { name: "Filters" }).click();
+    await expect(page.getByRole("dialog")).toBeVisible();
+    await look("filters of runs");
+    await page.keyboard.press("Escape");
     await page.goto(`${product.url}/robots`);
     await page.getByRole("main").waitFor();
     await look("robots");
@@ -156,6 +160,11 @@ for (const scheme of ["light", "dark"] as const) {
     }
     const runs = await product.ask<{ id: string }[]>("/api/runs?limit=1", {}, product.runnerUrl);
     for (const { id } of runs) {
+      await page.goto(`${product.url}/runs/${id}`);
+      for (const tab of ["Parameters", "Facts", "Raw"]) {
+        await page.getByRole("tab", { name: tab }).click();
+        await look(`${tab} of a run`);
+      }
       await page.goto(`${product.url}/runs/compare?a=${id}&b=${id}`);
       await page.getByRole("heading", { name: "Where they part" }).waitFor();
       await look("two runs");

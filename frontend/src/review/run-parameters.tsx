@@ -56,16 +56,20 @@ function Rows({ rows, charts }: { rows: readonly ParameterRow[]; charts: boolean
 /** A table of values: a row for each parameter, a column for each group of visits. */
 function Table({
   title,
+  of,
   columns,
   rows,
 }: {
   title: string;
+  /** The action in words. */
+  of: string;
   columns: readonly string[];
   rows: readonly ParameterRow[];
 }) {
   const charts = rows.some((row) => row.over);
   return (
-    <div className={style.scroll}>
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: what is wider than its place is scrolled by keys, too
+    <section className={style.scroll} tabIndex={0} aria-label={`${title}: ${of}`}>
       <table>
         <thead>
           <tr>
@@ -78,7 +82,7 @@ function Table({
         </thead>
         <Rows rows={rows} charts={charts} />
       </table>
-    </div>
+    </section>
   );
 }
 
@@ -97,10 +101,10 @@ function Action(props: { name: string; action: ActionRun; run: Run; onPick: () =
       {found.rows.length === 0 ? (
         <p className={style.none}>No parameter has a value.</p>
       ) : (
-        <Table title="Parameter" columns={["Sent", ...found.visits]} rows={found.rows} />
+        <Table title="Parameter" of={words} columns={["Sent", ...found.visits]} rows={found.rows} />
       )}
       {gave.rows.length > 0 && (
-        <Table title="Output, as observed" columns={gave.visits} rows={gave.rows} />
+        <Table title="Output, as observed" of={words} columns={gave.visits} rows={gave.rows} />
       )}
       {found.unseen > 0 && (
         <p className={style.none}>Of {counted(found.unseen, "visit")} nobody saw the values.</p>
