@@ -1,4 +1,4 @@
-"""Rules of robots, and repeats, on real engines: the code of the actions writes down what has begun and what
+"""Rules of robots, repeats and the queue on real engines: the code of the actions writes down what has begun and what
 was told to stop.
 
 Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it.
@@ -24,6 +24,8 @@ from std_msgs.msg import Bool
 
 from action_assistant.errors import Conflict
 from action_assistant.runner.links.hardware_stop import HardwareStop
+from action_assistant.runner.queues.entry import QueueRequest
+from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.repeats.repeat import RepeatRequest
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.robots.rights import PagePresence, Rules
@@ -33,6 +35,7 @@ from action_assistant.umrf.model import Graph
 from ros.led_engines import Engines, as_led, over, relay, working
 from ros.test_hardware_stops import publishing
 from runner.harness import ANN, at_once, clock_us, order, sequence, until
+from runner.queues.test_queues import put, reopened, started
 from runner.repeats.test_repeats import opened, pressed
 from runner.start.test_rights_registry import ANN as ANN_SIGNED_IN
 from runner.start.test_rights_registry import author
@@ -158,5 +161,43 @@ def test_the_code_of_a_repeat_begins_once_for_each_press_and_not_after_a_stop(
                 await pressed(repeats, repeat, 3)
             await anyio.sleep(1)
             assert count(engines, "begin") == {f"OxWork_{n}": 2 for n in range(3)}
+
+    anyio.run(main)
+
+
+def test_what_waits_begins_by_a_press_alone_once_and_not_after_a_stop(engines: Engines) -> None:
+    async def main() -> None:
+        async with (
+            engines.led() as (control, journal),
+            Queues.opened(control, journal, clock_us=clock_us, run_in_worker=at_once) as queues,
+        ):
+            run = (await control.start(as_led(task("first", 0.5)), ANN)).run.id
+            waiting = [
+                await put(queues, QueueRequest(start=as_led(task(f"wait {n}", 0.5))))
+                for n in range(3)
+            ]
+            with pytest.raises(Conflict, match="is not free"):
+                await started(queues, waiting[0])
+            assert await over(control, run, 30) == "finished"
+            await until(lambda: waiting[0].ready_at is not None, 10)
+            await anyio.sleep(2)
+            assert count(engines, "begin") == {f"OxWork_{n}": 1 for n in range(3)}
+            with pytest.raises(Conflict, match="1 before it wait"):
+                await started(queues, waiting[1])
+            run = await started(queues, waiting[0])
+            assert await over(control, run, 30) == "finished"
+            assert count(engines, "begin") == {f"OxWork_{n}": 2 for n in range(3)}
+            control.stop_robot("Ann", ANN)
+            with pytest.raises(Conflict, match="The queue of Ann is closed"):
+                await started(queues, waiting[1])
+            await anyio.sleep(2)
+            assert count(engines, "begin") == {f"OxWork_{n}": 2 for n in range(3)}
+            await reopened(queues, "Ann")
+            await anyio.sleep(1)
+            assert count(engines, "begin") == {f"OxWork_{n}": 2 for n in range(3)}
+            run = await started(queues, waiting[1])
+            assert await over(control, run, 30) == "finished"
+            assert count(engines, "begin") == {f"OxWork_{n}": 3 for n in range(3)}
+            assert queues.entries == (waiting[2],)
 
     anyio.run(main)
