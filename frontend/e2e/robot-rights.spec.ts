@@ -70,9 +70,16 @@ test("of two people who want a baton one takes it, and the other sees who has it
   await form.getByRole("switch", { name: "The operator's page stays visible" }).press("Space");
   await form.getByRole("textbox", { name: "A led run waits after" }).fill("20");
   await picture(ada.page, "page");
+  await form.getByRole("button", { name: "Add a check" }).click();
+  const check = form.getByRole("group", { name: "check 1" });
+  await check.getByRole("textbox", { name: "Topic" }).fill("/battery");
+  await form.getByRole("button", { name: "Add a check" }).scrollIntoViewIfNeeded();
+  await picture(ada.page, "health");
   await form.getByRole("button", { name: "Save" }).click();
   for (const { page } of [ada, ben])
     await expect(robot(page)).toContainText("Nobody has its baton");
+  const unknown = "The battery of David is unknown: nobody publishes it";
+  await expect(robot(ben.page)).toContainText(`${unknown}: /battery`);
   await robot(ada.page).getByRole("button", { name: "Take the baton" }).click();
   await expect(robot(ada.page)).toContainText("You have its baton");
   await expect(robot(ben.page)).toContainText("Ada has its baton");
@@ -91,6 +98,7 @@ test("the start says who has the baton, and it is taken over there with a reason
   await expect(looks).toContainText("Ada has its baton", { timeout: 30_000 });
   await expect(looks).toContainText("which the robot does not enforce: torque at most 60");
   await expect(looks).toContainText("after 60 s the run is stopped. It cannot be made to wait");
+  await expect(looks).toContainText("battery of David is unknown: nobody publishes it (/battery)");
   // This page is visible, and has answered the runner.
   await expect(looks).not.toContainText("No visible page of Ben answers now");
   await expect(button(page, /A check prevents the start/)).toBeDisabled();

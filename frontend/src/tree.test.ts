@@ -385,6 +385,8 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "review/run-events.tsx RunEvents": "a filter",
   "review/incident-dialog.tsx IncidentDialog": DIALOG,
   "review/run-menu.tsx ExpectDialog": DIALOG,
+  "robots/health-fields.tsx CheckFields":
+    "a part of HealthFields, which holds all checks as a draft",
   "robots/robot-form.tsx Profile": "a part of RobotForm, which holds all of the robot as a draft",
   "robots/robot-form.tsx Reach": "a part of RobotForm, which holds all of the robot as a draft",
   "runs/start/start-dialog.tsx Choice": "no text: a robot that is ticked",

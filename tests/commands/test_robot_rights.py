@@ -1,6 +1,6 @@
 """`robots rights`, `baton`, `lock` and `unlock`: the rights of a robot from the command line."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -77,6 +77,7 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
     for wrong, why in (("10", "write it as"), ("60..10", "Stop follows"), ("1..9", "3 s or later")):
         assert why in said("rights", "David", "--page-present", wrong, code=1)
     assert "visible page" not in said("rights", "David", "--page-present", "")
+    health_is_set_and_shown(said)
     assert main(["robots", "drill", "David"]) == 1  # none was ever made
     assert "There is no such run" in said(
         *("drill", "David", "--run", "x", "--saw-it-stop", "yes", "--hardware-stop", "no"), code=1
@@ -86,6 +87,20 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
     assert "OUT OF SERVICE" in said("list")
     assert said("unlock", "David") == "David is in service\n"
     assert "in service already" in said("unlock", "David", code=1)
+
+
+def health_is_set_and_shown(said: Callable[..., str]) -> None:
+    shown = said("rights", "David", "--health", "/battery=30%,block", "--health", "/d:a: b=1,5s")
+    assert (
+        "battery below 30 % on /battery blocks a start; unknown (older than 30 s) blocks" in shown
+    )
+    assert "a: b at WARN or above on /d warns; unknown (older than 5 s) warns" in shown
+    assert "The battery of David is unknown: " in shown
+    assert "battery below" in said("rights", "David", "--watched", "off")  # it stays
+    for wrong in ("/battery=30", "/battery=low%", "=30%", "/battery=nan%", "/d:a=1,soon"):
+        assert "is no such check" in said("rights", "David", "--health", wrong, code=1)
+    assert "100 % at most" in said("rights", "David", "--health", "/battery=101%", code=1)
+    assert "battery" not in said("rights", "David", "--no-health")
 
 
 def test_only_an_owner_switches_off_that_a_second_person_is_asked(product: Product) -> None:

@@ -28,7 +28,8 @@ from action_assistant.runner.queues.entry import QueueRequest
 from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.repeats.repeat import RepeatRequest
 from action_assistant.runner.repeats.service import Repeats
-from action_assistant.runner.robots.rights import PagePresence, Rules
+from action_assistant.runner.robots.rights import Rules
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.views import time as as_text
 from action_assistant.runner.start.admission import GoOnRequest
 from action_assistant.umrf.model import Graph

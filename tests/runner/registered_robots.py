@@ -8,6 +8,7 @@ import msgspec
 
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.hardware_stop import StopSignal
+from action_assistant.runner.links.health import HealthSignal
 from action_assistant.runner.links.port import (
     Answer,
     Candidate,
@@ -100,6 +101,10 @@ class RegisteredRobots:
     async def stop_signal(self, *_: object) -> StopSignal:
         """Return a signal that nobody writes."""
         return StopSignal()
+
+    async def health_signal(self, *_: object) -> HealthSignal:
+        """Return a signal that nobody writes."""
+        return HealthSignal()
 
     async def sighting(self) -> Sighting:
         """Return the engines in sight."""

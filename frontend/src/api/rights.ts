@@ -13,6 +13,7 @@ export type RobotRight = RunnerApi["RightShown"];
 export type RightsWanted = Required<RunnerApi["RightsWanted"]>;
 export type ReportedStop = RunnerApi["HardwareStopShown"];
 export type PagePresence = RunnerApi["PagePresence"];
+export type HealthCheck = RunnerApi["HealthCheckShown"];
 export type LimitedTo = RunnerApi["Limit"];
 export type AllowedOperator = RunnerApi["OperatorShown"];
 
@@ -22,6 +23,11 @@ export function limitWords({ parameter, action, least, most }: LimitedTo): strin
   const place = isolated(parameter) + of;
   if (least === null) return `${place} at most ${most}`;
   return most === null ? `${place} at least ${least}` : `${place} from ${least} to ${most}`;
+}
+
+/** Return the rule about visible pages on a robot in words. */
+export function pageWords({ wait_s, stop_s }: PagePresence): string {
+  return `without a visible page a led run waits after ${wait_s} s, and each run is stopped after ${stop_s} s`;
 }
 
 /** Asks what the signed-in person may do on all robots; asked again when the rights of one change. */

@@ -9,7 +9,7 @@ import { useVersions, versionName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { actorWords } from "../api/people";
 import { type RunMarks, setMarks, useLabels, useMarks, useRaw } from "../api/review";
-import { limitWords } from "../api/rights";
+import { limitWords, pageWords } from "../api/rights";
 import { type Run, requesterPlace, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { fromWords } from "../status/earlier-list";
@@ -52,6 +52,14 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ...Object.entries(run.limits ?? {}).map(([robot, limits]): [string, string] => [
       "Limits",
       `${isolated(robot)}: ${limits.map(limitWords).join(", ")}`,
+    ]),
+    ...Object.entries(run.pages ?? {}).map(([robot, page]): [string, string] => [
+      "Visible page",
+      `${isolated(robot)}: ${pageWords(page)}`,
+    ]),
+    ...Object.entries(run.health ?? {}).map(([robot, said]): [string, string] => [
+      `Health of ${isolated(robot)}`,
+      said.join(" "),
     ]),
     ...(run.repeat ? [["Repeat", `its run ${run.repeat.cell}`] as [string, string]] : []),
     ["Engine", runPlace(run)],

@@ -1,7 +1,7 @@
 /** The record of a run on paper: what each action did, when as far as that is known, and who started it. */
 
 import { actorWords } from "../api/people";
-import { limitWords } from "../api/rights";
+import { limitWords, pageWords } from "../api/rights";
 import { type Run, requesterPlace, runPlace, type Visit } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
@@ -117,6 +117,12 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
         ...Object.entries(run.limits ?? {}).map(
           ([robot, limits]) =>
             ["Limits", `${isolated(robot)}: ${limits.map(limitWords).join(", ")}`] as const,
+        ),
+        ...Object.entries(run.pages ?? {}).map(
+          ([robot, page]) => ["Visible page", `${isolated(robot)}: ${pageWords(page)}`] as const,
+        ),
+        ...Object.entries(run.health ?? {}).map(
+          ([robot, said]) => [`Health of ${isolated(robot)}`, said.join(" ")] as const,
         ),
         ["Robot", runPlace(run)],
         ["Started by", `${by}${requesterPlace(run.author)}`],

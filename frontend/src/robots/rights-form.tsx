@@ -22,6 +22,7 @@ import { type AllowedOperator, lockRobot, setRights, useEntitled } from "../api/
 import type { Robot } from "../api/robots";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
+import { checkDraftsOf, checksOf, HealthFields } from "./health-fields";
 import { draftsOf, LimitFields, limitsOf } from "./limit-fields";
 import { PagePresenceFields } from "./page-presence-fields";
 import style from "./rights-form.module.css";
@@ -111,6 +112,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
   const [releasedOnly, setReleasedOnly] = useState(robot.released_only);
   const [stop, setStop] = useState(robot.hardware_stop);
   const [page, setPage] = useState(robot.page_presence);
+  const [health, setHealth] = useState(() => checkDraftsOf(robot.health_checks));
   const [limits, setLimits] = useState(() => draftsOf(robot.limits));
   usePendingText(
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
@@ -133,6 +135,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
         limits: limitsOf(limits),
         hardware_stop: stop,
         page_presence: page,
+        health: checksOf(health),
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
@@ -217,6 +220,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
           />
           <PagePresenceFields page={page} onChange={setPage} />
           <StopTopicFields stop={stop} onChange={setStop} />
+          <HealthFields drafts={health} onChange={setHealth} />
           <LimitFields drafts={limits} onChange={setLimits} />
           {error !== null && (
             <Text c="var(--error)" role="alert">

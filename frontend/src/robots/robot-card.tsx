@@ -17,7 +17,7 @@ import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive, useRobotAnsweredAt } from "../api/page-link";
 import { useMay } from "../api/people";
-import { useRight } from "../api/rights";
+import { pageWords, useRight } from "../api/rights";
 import {
   forgetRobot,
   type Registration,
@@ -46,10 +46,10 @@ interface Props {
   onImport: (text: string, name: string) => void;
 }
 
-type Sign = { good: boolean; text: string };
+type Sign = { good: boolean; text: string; age?: string };
 
 /** Return the warnings that a person should know before trusting a robot or starting a run. */
-function robotSigns(robot: Robot): Sign[] {
+function robotSigns(robot: Robot, now: number): Sign[] {
   if (robot.state === "no_link") return [];
   const signs: Sign[] = [];
   if (robot.servers === 1)
@@ -71,9 +71,13 @@ function robotSigns(robot: Robot): Sign[] {
     const text = robot.pressed || "Its hardware stop is not pressed, as it reports";
     signs.push({ good: robot.pressed === "", text });
   }
+  for (const { state, text, topic, heard_at } of robot.health) {
+    const at = instant(heard_at);
+    const age = at === null ? "" : `, ${ago(at, now)}`;
+    signs.push({ good: state === "fine", text: `${text}: ${isolated(topic)}`, age });
+  }
   if (robot.page_presence !== null) {
-    const { wait_s, stop_s } = robot.page_presence;
-    const text = `Asks for a visible page of whoever runs something: without one a led run waits after ${wait_s} s, and each run is stopped after ${stop_s} s`;
+    const text = `Asks for whoever runs something: ${pageWords(robot.page_presence)}`;
     signs.push({ good: true, text });
   }
   if (robot.others > 0) {
@@ -84,6 +88,21 @@ function robotSigns(robot: Robot): Sign[] {
     signs.push({ good: false, text: `Its feedback has another name: ${robot.actor}` });
   }
   return signs;
+}
+
+function Signs({ robot }: { robot: Robot }) {
+  const now = useNow(1000);
+  return (
+    <ul className={style.signs}>
+      {robotSigns(robot, now).map(({ good, text, age = "" }) => (
+        <li className="inline-row gap-30" key={text} data-good={good || undefined}>
+          {good ? <IconCheck size={14} aria-hidden /> : <IconAlertTriangle size={14} aria-hidden />}{" "}
+          {text}
+          {age}
+        </li>
+      ))}
+    </ul>
+  );
 }
 
 function Facts({ robot }: { robot: Robot }) {
@@ -231,18 +250,7 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
       <Drills robot={robot} />
       <WhyNot robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
-      <ul className={style.signs}>
-        {robotSigns(robot).map(({ good, text }) => (
-          <li className="inline-row gap-30" key={text} data-good={good || undefined}>
-            {good ? (
-              <IconCheck size={14} aria-hidden />
-            ) : (
-              <IconAlertTriangle size={14} aria-hidden />
-            )}{" "}
-            {text}
-          </li>
-        ))}
-      </ul>
+      <Signs robot={robot} />
       <RobotRuns robot={robot} onImport={onImport} />
       {linked && (
         <Tabs value={open} onChange={setOpen} className={style.tabs ?? ""} keepMounted={false}>

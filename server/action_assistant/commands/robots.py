@@ -13,6 +13,7 @@ import msgspec
 from action_assistant.commands.client import Server, command, decoded, print_json, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.runner.links.hardware_stop import HardwareStop
+from action_assistant.runner.links.health import HealthCheck
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import SECOND_PERSON
 
@@ -153,6 +154,16 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         help="whoever starts there, or holds its baton, keeps a page visible: without one for so many "
         "seconds a led run waits, and each run is stopped, as 10..60; no enabling device; '' for off",
     )
+    rights.add_argument(
+        "--health",
+        action="append",
+        metavar="TOPIC=PERCENT%|TOPIC:STATUS=LEVEL[,block][,unknown-warns][,SECONDSs]",
+        help="looked at before a start: a battery (sensor_msgs/BatteryState) below so many percent, as "
+        "/battery=30%%,block, or a status of diagnostics from a level on, as /diagnostics:motors=2. It "
+        "warns, or blocks the start; where it blocks, unknown does too. An older message than 30 s is "
+        "unknown. Again for each, and all others are dropped; information, no safety function",
+    )
+    rights.add_argument("--no-health", action="store_true", help="look at no health any more")
     rights.set_defaults(handler=_rights)
 
 
@@ -275,6 +286,8 @@ def _rights(options: argparse.Namespace) -> int:
             options.no_limits or None,
             *stop,
             options.page_present,
+            options.health,
+            options.no_health or None,
         )
         if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
@@ -298,6 +311,8 @@ def _rights(options: argparse.Namespace) -> int:
                 wanted["hardware_stop"] = _hardware_stop(options, robot)
             if options.page_present is not None:
                 wanted["page_presence"] = _page_presence(options.page_present)
+            if options.health or options.no_health:
+                wanted["health"] = [_health(each) for each in options.health or ()]
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
     print(one_line(f"{robot.name}: {_operators_text(robot)}"))
@@ -331,6 +346,11 @@ def _rules_texts(robot: "Robot") -> list[str]:
             f"without a visible page of its person a led run on {robot.name} waits after "
             f"{page.wait_s:g} s, and each run is stopped after {page.stop_s:g} s; no enabling device"
         )
+    for check in robot.health_checks:
+        said.append(HealthCheck(**msgspec.structs.asdict(check)).words())
+    for each in robot.health:
+        heard = "" if each.heard_at is None else f", heard {each.heard_at.astimezone():%H:%M:%S}"
+        said.append(f"{each.text} ({each.topic}{heard})")
     if robot.drill_days is not None:
         said.append(f"a Stop drill of {robot.name} counts for {robot.drill_days} days")
     return said
@@ -395,6 +415,36 @@ def _limit(asked: str) -> dict[str, Any]:
             f"{asked!r} is no limit; write it as torque=..60 or Grip.torque=5..60."
         ) from wrong
     return {"parameter": parameter, "action": action, **found}
+
+
+def _health(asked: str) -> dict[str, Any]:
+    """Return something of a robot's health from TOPIC=PERCENT% or TOPIC:STATUS=LEVEL, with what follows.
+    Raise RequestRefused if it is neither."""
+    place, _, said = asked.rpartition("=")
+    topic, _, status = place.partition(":")
+    bound, *more = said.split(",")
+    check: dict[str, Any] = {"topic": topic}
+    try:
+        if bound.endswith("%") and not status:
+            check["below"] = float(bound[:-1])
+        elif not status:
+            raise ValueError
+        else:
+            check |= {"kind": "diagnostics", "status": status, "level": int(bound)}
+        for each in more:
+            if each in {"warn", "block"}:
+                check["poor"] = each
+            elif each in {"unknown-warns", "unknown-blocks"}:
+                check["unknown"] = each.removeprefix("unknown-").removesuffix("s")
+            else:
+                check["age_s"] = float(each.removesuffix("s"))
+        if not topic or not all(isfinite(check.get(name, 0)) for name in ("below", "age_s")):
+            raise ValueError
+    except ValueError as wrong:
+        raise RequestRefused(
+            f"{asked!r} is no such check; write it as /battery=30%,block or /diagnostics:motors=2,5s."
+        ) from wrong
+    return check
 
 
 def _stop_details(options: argparse.Namespace) -> dict[str, Any]:

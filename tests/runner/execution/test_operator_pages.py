@@ -13,8 +13,9 @@ import pytest
 from action_assistant.errors import Conflict
 from action_assistant.runner.api.live import Hub, Outbox
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.robots.rights import PagePresence, Rules
+from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Held, StopRequested
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, GroupRequest
 from action_assistant.web.auth.identity import Identity, Token

@@ -12,6 +12,7 @@ import msgspec
 import pytest
 
 from action_assistant.runner.links.hardware_stop import StopSignal
+from action_assistant.runner.links.health import HealthSignal
 from action_assistant.runner.links.port import Candidate, Registration, Sighting, Standing
 from action_assistant.runner.links.ros2 import checkup
 from action_assistant.runner.links.ros2.checkup import shared_memory
@@ -78,6 +79,10 @@ class Seen:
     async def stop_signal(self, *_: object) -> StopSignal:
         """Return a signal that nobody writes."""
         return StopSignal()
+
+    async def health_signal(self, *_: object) -> HealthSignal:
+        """Return a signal that nobody writes."""
+        return HealthSignal()
 
     async def sighting(self) -> Sighting:
         """The engines in sight, and that no other will come."""

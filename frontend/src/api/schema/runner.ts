@@ -1074,6 +1074,69 @@ export interface RunnerApi {
         commit: string | null;
     };
     /**
+     * HealthCheckShown
+     * @description Names something of a robot's health, and what follows for a start there. Of `battery`, a share of
+     *     charge below `below` percent is poor; of `diagnostics`, the status with the name `status` at this
+     *     `level` or above. `age_s`: seconds after which the newest message says nothing any more; `poor`,
+     *     `unknown`: what follows where it is that.
+     */
+    HealthCheckShown: {
+        topic: string;
+        /** @enum {string} */
+        kind: "battery" | "diagnostics";
+        below: number;
+        status: string;
+        level: number;
+        age_s: number;
+        /** @enum {string} */
+        poor: "block" | "warn";
+        /** @enum {string} */
+        unknown: "block" | "warn";
+    };
+    /**
+     * HealthShown
+     * @description Something of a robot's health as it was when the robot was read. `text`: all of it in words, but its
+     *     age; `follows`: for a start, null for nothing; `heard_at`: when its newest message came.
+     */
+    HealthShown: {
+        topic: string;
+        /** @enum {string} */
+        state: "fine" | "poor" | "unknown";
+        text: string;
+        follows: ("block" | "warn") | null;
+        heard_at: string | null;
+    };
+    /**
+     * HealthWanted
+     * @description Names something of a robot's health, and what follows for a start there. Of `battery`, a share of
+     *     charge below `below` percent is poor; of `diagnostics`, the status with the name `status` at this
+     *     `level` or above (1: warning, 2: error). `age_s`: seconds after which the newest message says nothing any
+     *     more; `poor`, `unknown`: what follows where it is that; `unknown` is null for the same as `poor`.
+     */
+    HealthWanted: {
+        topic: string;
+        /**
+         * @default battery
+         * @enum {string}
+         */
+        kind?: "battery" | "diagnostics";
+        /** @default 30 */
+        below?: number;
+        /** @default  */
+        status?: string;
+        /** @default 2 */
+        level?: number;
+        /** @default 30 */
+        age_s?: number;
+        /**
+         * @default warn
+         * @enum {string}
+         */
+        poor?: "block" | "warn";
+        /** @default null */
+        unknown?: ("block" | "warn") | null;
+    };
+    /**
      * Heartbeat
      * @description Sent once a second while the link is alive. `seen`: when each open run was last shown by its
      *     engine; `heard`: when each robot last answered.
@@ -2243,8 +2306,8 @@ export interface RunnerApi {
      *     `released_only`: only versions start there that an owner has released;
      *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
      *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not;
-     *     `page_presence`: null where no page has to stay visible; where one of these is missing, it stays as it
-     *     is.
+     *     `page_presence`: null where no page has to stay visible; `health`: looked at before a start; where one of
+     *     these is missing, it stays as it is.
      */
     RightsWanted: {
         /** @default all */
@@ -2262,6 +2325,7 @@ export interface RunnerApi {
         limits?: RunnerApi["LimitWanted"][];
         hardware_stop?: RunnerApi["HardwareStopWanted"] | null;
         page_presence?: RunnerApi["PagePresenceWanted"] | null;
+        health?: RunnerApi["HealthWanted"][];
     };
     /**
      * Robot
@@ -2277,7 +2341,8 @@ export interface RunnerApi {
      *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
      *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
      *     is not; `pressed`: why it counts as pressed, "" if it does not; `page_presence`: for how long the page
-     *     of whoever is responsible for a run may be missing there, null where none is asked for.
+     *     of whoever is responsible for a run may be missing there, null where none is asked for;
+     *     `health_checks`: looked at before a start; `health`: what they show.
      */
     Robot: {
         name: string;
@@ -2318,6 +2383,8 @@ export interface RunnerApi {
         hardware_stop: RunnerApi["HardwareStopShown"] | null;
         pressed: string;
         page_presence: RunnerApi["PagePresence"] | null;
+        health_checks: RunnerApi["HealthCheckShown"][];
+        health: RunnerApi["HealthShown"][];
     };
     /**
      * RobotChange
@@ -2642,7 +2709,8 @@ export interface RunnerApi {
      *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
      *     `tree_digest`: of the graph together with them, null if the starter did not send it; `earlier`: what
      *     it takes for granted, null if it began at the entry; `limits`: those of its robots at the start,
-     *     or at the last change of its graph.
+     *     or at the last change of its graph; `pages`: the rules about visible pages at the start; `health`: a
+     *     sentence for each thing that its robots reported then.
      */
     RunWhole: {
         id: string;
@@ -2720,6 +2788,12 @@ export interface RunnerApi {
         earlier: RunnerApi["EarlierShown"] | null;
         limits: {
             [key: string]: RunnerApi["Limit"][];
+        };
+        pages: {
+            [key: string]: RunnerApi["PagePresence"];
+        };
+        health: {
+            [key: string]: string[];
         };
     };
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["ThereMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];

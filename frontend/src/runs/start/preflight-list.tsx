@@ -109,6 +109,11 @@ function Line({ item, look, moment }: PreflightLineProps) {
   );
 }
 
+/** Return a key that stays while other items come and go: several items may have one code. */
+function keyOf(items: readonly PreflightItem[], code: string, at: number): string {
+  return `${code} ${items.slice(0, at).filter((item) => item.code === code).length}`;
+}
+
 /** Offers the baton of a robot that it would need. */
 function BatonRemedy({ engine, onTaken }: { engine: string; onTaken: () => void }) {
   const { now } = useLive();
@@ -146,8 +151,8 @@ export function PreflightList({ engine, alone, look, moment }: Props) {
         aria-label={isLed ? "Looked at in the whole graph" : `Looked at on ${isolated(engine)}`}
       >
         {look
-          ? look.items.map((item) => (
-              <Line key={item.code} item={item} look={look} moment={moment} />
+          ? look.items.map((item, i) => (
+              <Line key={keyOf(look.items, item.code, i)} item={item} look={look} moment={moment} />
             ))
           : codes.map((code) => (
               <li key={code} className={style.line} data-verdict="waiting">

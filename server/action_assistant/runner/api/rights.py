@@ -14,9 +14,16 @@ from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.run_guard import require_run, unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.links.hardware_stop import HardwareStop, SignalKind
+from action_assistant.runner.links.health import (
+    MOST_CHECKS,
+    Consequence,
+    HealthCheck,
+    HealthKind,
+)
 from action_assistant.runner.robots.registration import DrillShown, Robot, drill_view
-from action_assistant.runner.robots.rights import Operator, PagePresence, Rules
+from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs import views
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.start.drills import DrillRequest
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.limits import MOST as MOST_LIMITS
@@ -68,6 +75,22 @@ class HardwareStopWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     level: Annotated[int, msgspec.Meta(ge=1, le=3)] = 2
 
 
+class HealthWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Names something of a robot's health, and what follows for a start there. Of `battery`, a share of
+    charge below `below` percent is poor; of `diagnostics`, the status with the name `status` at this
+    `level` or above (1: warning, 2: error). `age_s`: seconds after which the newest message says nothing any
+    more; `poor`, `unknown`: what follows where it is that; `unknown` is null for the same as `poor`."""
+
+    topic: Annotated[str, msgspec.Meta(max_length=200)]
+    kind: HealthKind = "battery"
+    below: float = 30.0
+    status: Annotated[str, msgspec.Meta(max_length=200)] = ""
+    level: Annotated[int, msgspec.Meta(ge=1, le=2)] = 2
+    age_s: float = 30.0
+    poor: Consequence = "warn"
+    unknown: Consequence | None = None
+
+
 class PagePresenceWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rule that the page of whoever is responsible for a run stays visible. Seconds without an
     answer of one: after `wait_s` a led run begins nothing further, after `stop_s` each run is
@@ -84,8 +107,8 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     `released_only`: only versions start there that an owner has released;
     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it is not;
-    `page_presence`: null where no page has to stay visible; where one of these is missing, it stays as it
-    is."""
+    `page_presence`: null where no page has to stay visible; `health`: looked at before a start; where one of
+    these is missing, it stays as it is."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
@@ -100,6 +123,10 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     ) = msgspec.UNSET
     hardware_stop: HardwareStopWanted | msgspec.UnsetType | None = msgspec.UNSET
     page_presence: PagePresenceWanted | msgspec.UnsetType | None = msgspec.UNSET
+    health: (
+        Annotated[tuple[HealthWanted, ...], msgspec.Meta(max_length=MOST_CHECKS)]
+        | msgspec.UnsetType
+    ) = msgspec.UNSET
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -365,6 +392,12 @@ def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
         page = PagePresence(**msgspec.structs.asdict(wanted.page_presence))
         if page.fault:
             raise BadInput(page.fault, where={"path": "/page_presence"})
+    health = before.health
+    if wanted.health is not msgspec.UNSET:
+        health = tuple(map(_health_check, wanted.health))
+    for index, check in enumerate(health):
+        if check.fault:
+            raise BadInput(check.fault, where={"path": f"/health/{index}"})
     operators: tuple[Operator, ...] | None = None
     if wanted.operators != "all":
         ids = [each.id for each in wanted.operators]
@@ -381,7 +414,13 @@ def _rules_of(wanted: RightsWanted, before: Rules) -> Rules:
         limits=limits,
         hardware_stop=stop,
         page_presence=page,
+        health=health,
     )
+
+
+def _health_check(wanted: HealthWanted) -> HealthCheck:
+    unknown = wanted.poor if wanted.unknown is None else wanted.unknown
+    return HealthCheck(**msgspec.structs.asdict(msgspec.structs.replace(wanted, unknown=unknown)))
 
 
 def _operator(wanted: OperatorWanted) -> Operator:

@@ -135,7 +135,7 @@ async def modify(
     targets = () if run.simulated else (run.engine,)
     graph = GraphOutline(ready.name, ready.actions)
     message = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
-    require(claim_of(start, ready))
+    require(msgspec.structs.replace(claim_of(start, ready), is_start=False))
     try:
         await opened.modify(
             author, message, asked.version, ready.digest, asked.continue_from, watching, limits

@@ -13,7 +13,7 @@ import anyio
 
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.robots.rights import PagePresence
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.web.auth.identity import Identity

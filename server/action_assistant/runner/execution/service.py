@@ -20,6 +20,7 @@ from action_assistant.runner.execution.conducted_steps import RUNNER
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.earlier_runs import EarlierRuns
 from action_assistant.runner.execution.hardware_stops import HardwareStops
+from action_assistant.runner.execution.health import HealthWatch
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.led_commands import (
     LedCommands,
@@ -43,6 +44,7 @@ from action_assistant.runner.robots.registration import (
     Robot,
     registration_of,
     seen_by,
+    with_health,
     with_rights,
 )
 from action_assistant.runner.robots.registry import Robots
@@ -125,6 +127,10 @@ class ExecutionService:
             self._rights_changed,
         )
         self.rights.why_pressed = self.hardware_stops.why
+        self._health: Final = HealthWatch(
+            robots, runtime, self.rights.health_of, self._robots_changed
+        )
+        self.rights.health_now = self._health.of
         look = LedLook(
             self._runs,
             self.foreign_stops,
@@ -249,6 +255,7 @@ class ExecutionService:
     def _robots_changed(self) -> None:
         self.hardware_stops.look()
         self.operator_pages.look()
+        self._health.look()
         for watcher in self._robot_watchers:
             watcher()
 
@@ -568,7 +575,8 @@ class ExecutionService:
             )
         rights = self.rights.of(plain.name)
         due = rights.drill_due(self._runtime.clock_us() / 1e6)
-        return with_rights(plain, rights, shown, due, self.hardware_stops.why(plain.name))
+        found = with_rights(plain, rights, shown, due, self.hardware_stops.why(plain.name))
+        return with_health(found, self._health.of(plain.name), self._runtime.clock_us())
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Register a robot, or change its registration, and return it. Raise BadInput if the
@@ -649,6 +657,7 @@ class ExecutionService:
         # Until here each robot with a hardware stop counts as pressed; what a press stops is known now.
         self._runtime.tasks.start_soon(self.hardware_stops.run)
         self._runtime.tasks.start_soon(self.operator_pages.run)
+        self._runtime.tasks.start_soon(self._health.run)
 
     async def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is

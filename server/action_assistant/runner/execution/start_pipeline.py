@@ -182,6 +182,11 @@ class StartPipeline:
         await self._checks.give_words(accepted, author)
         self._checks.require_free(accepted)
         self._rights.require(robots, starter, claim)
+        requested = msgspec.structs.replace(
+            requested,
+            pages=self._rights.page_presences(robots),
+            health=self._rights.health(robots),
+        )
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)
             occupied = self._checks.why_occupied(accepted)

@@ -13,7 +13,7 @@ TYPES: Final[dict[SignalKind, str]] = {
     "bool": "std_msgs/msg/Bool",
     "diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
 }
-_TOPIC: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+TOPIC: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 _LONGEST_AGE_S: Final = 3600.0
 
 
@@ -32,7 +32,7 @@ class HardwareStop(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     @property
     def fault(self) -> str:
         """The reason why this cannot be listened to, as a sentence; "" if it can."""
-        if not _TOPIC.fullmatch(self.topic) or len(self.topic) > 200:
+        if not TOPIC.fullmatch(self.topic) or len(self.topic) > 200:
             return "This is no name of a ROS 2 topic."
         if not isfinite(self.age_s) or not 0.1 <= self.age_s <= _LONGEST_AGE_S:
             return f"The age of a message is 0.1 to {_LONGEST_AGE_S:.0f} s."

@@ -14,6 +14,7 @@ import msgspec
 
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
+from action_assistant.runner.links.health import HealthCheck, HealthSignal
 from action_assistant.runner.links.observations import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Precondition
@@ -345,6 +346,13 @@ class Reach(Protocol):
     ) -> StopSignal:
         """Listen to the hardware stop of a robot from now on. `changed` is called after a message that
         says another thing than the one before it. Raise RuntimeError if that is not possible."""
+        ...
+
+    async def health_signal(
+        self, registration: Registration, facts: EngineFacts, check: HealthCheck
+    ) -> HealthSignal:
+        """Listen to something of a robot's health from now on. Raise RuntimeError if that is not
+        possible."""
         ...
 
     async def sighting(self) -> Sighting:

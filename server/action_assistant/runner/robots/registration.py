@@ -11,6 +11,12 @@ from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.links.hardware_stop import SignalKind
+from action_assistant.runner.links.health import (
+    Consequence,
+    HealthKind,
+    HealthNow,
+    HealthState,
+)
 from action_assistant.runner.links.port import (
     CONDUCTED,
     SIMULATOR,
@@ -19,7 +25,8 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.rights import Drilled, PagePresence, RobotRights
+from action_assistant.runner.robots.rights import Drilled, RobotRights
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, Unseen
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import hold_names
@@ -133,6 +140,36 @@ class HardwareStopShown(msgspec.Struct, frozen=True, kw_only=True):
     level: int
 
 
+class HealthCheckShown(msgspec.Struct, frozen=True, kw_only=True):
+    """Names something of a robot's health, and what follows for a start there. Of `battery`, a share of
+    charge below `below` percent is poor; of `diagnostics`, the status with the name `status` at this
+    `level` or above. `age_s`: seconds after which the newest message says nothing any more; `poor`,
+    `unknown`: what follows where it is that."""
+
+    topic: str
+    kind: HealthKind
+    below: float
+    status: str
+    level: int
+    age_s: float
+    poor: Consequence
+    unknown: Consequence
+
+
+class HealthShown(msgspec.Struct, frozen=True, kw_only=True):
+    """A report of a robot's health as it was when the robot was read. `text`: all of it in words, but its
+    age; `follows`: for a start, null for nothing; `heard_at`: when its newest message came."""
+
+    topic: str
+    state: HealthState
+    text: str
+    follows: Consequence | None
+    heard_at: datetime | None
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
+
+
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why`: explains any state but `answering`.
 
@@ -146,7 +183,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never;
     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
     is not; `pressed`: why it counts as pressed, "" if it does not; `page_presence`: for how long the page
-    of whoever is responsible for a run may be missing there, null where none is asked for.
+    of whoever is responsible for a run may be missing there, null where none is asked for;
+    `health_checks`: looked at before a start; `health`: what they show.
     """
 
     name: str
@@ -184,6 +222,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     hardware_stop: HardwareStopShown | None = None
     pressed: str = ""
     page_presence: PagePresence | None = None
+    health_checks: tuple[HealthCheckShown, ...] = ()
+    health: tuple[HealthShown, ...] = ()
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -265,6 +305,22 @@ def drill_view(drill: Drilled) -> DrillShown:
     )
 
 
+def with_health(plain: Robot, health: tuple[HealthNow, ...], now_us: int) -> Robot:
+    """Return a robot with its health. `now_us`: microseconds UTC."""
+
+    def shown(each: HealthNow) -> HealthShown:
+        age_us = None if each.age_s is None else round(each.age_s * 1e6)
+        return HealthShown(
+            topic=each.check.full_topic,
+            state=each.state,
+            text=each.words,
+            follows=each.consequence,
+            heard_at=None if age_us is None else time(now_us - age_us),
+        )
+
+    return replace(plain, health=tuple(map(shown, health)))
+
+
 def seen_by(
     robot: Robot, unseen: Unseen | None, graphs_of: Callable[[str], RunGraphs | None]
 ) -> Robot:
@@ -328,4 +384,7 @@ def with_rights(
         and HardwareStopShown(**msgspec.structs.asdict(rules.hardware_stop)),
         pressed=pressed,
         page_presence=rules.page_presence,
+        health_checks=tuple(
+            HealthCheckShown(**msgspec.structs.asdict(each)) for each in rules.health
+        ),
     )

@@ -10,6 +10,7 @@ import msgspec
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.logs import begin
 from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
+from action_assistant.runner.links.health import HealthCheck, HealthSignal
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,
@@ -294,12 +295,21 @@ class Robots:
         self, name: str, rule: HardwareStop, changed: Callable[[], None]
     ) -> StopSignal:
         """Listen to the hardware stop of a robot, as `Reach.stop_signal` does."""
+        return await self._reached.stop_signal(*self._place(name), rule, changed)
+
+    async def health_signal(self, name: str, check: HealthCheck) -> HealthSignal:
+        """Listen to something of a robot's health, as `Reach.health_signal` does."""
+        return await self._reached.health_signal(*self._place(name), check)
+
+    @property
+    def _reached(self) -> Reach:
         if isinstance(self._reach, str):
             raise RuntimeError(self._reach)
-        registration = self.registration(name)
+        return self._reach
+
+    def _place(self, name: str) -> tuple[Registration, EngineFacts]:
         engine = self._engines.get(name)
-        facts = PINNED if engine is None else engine.facts
-        return await self._reach.stop_signal(registration, facts, rule, changed)
+        return self.registration(name), PINNED if engine is None else engine.facts
 
     async def sighting(self) -> Sighting:
         """Return the engines in sight now that are not registered, and for how many seconds others

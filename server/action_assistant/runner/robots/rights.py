@@ -13,7 +13,9 @@ from msgspec.structs import replace
 from action_assistant.errors import Conflict, Forbidden
 from action_assistant.kit.moments import moment
 from action_assistant.runner.links.hardware_stop import HardwareStop
+from action_assistant.runner.links.health import HealthCheck
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.umrf.limits import Limit, Limits, OverLimit
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
@@ -22,7 +24,16 @@ from action_assistant.web.auth.roles import Permission
 
 #: The codes of refusals, which are those of the items of a pre-flight.
 RightCode: TypeAlias = Literal[
-    "service", "right", "baton", "confirm", "watched", "drill", "released", "limit", "pressed"
+    "service",
+    "right",
+    "baton",
+    "confirm",
+    "watched",
+    "drill",
+    "released",
+    "limit",
+    "pressed",
+    "health",
 ]
 #: Those that concern the person alone, whatever is started.
 OF_PEOPLE: Final[frozenset[RightCode]] = frozenset({"service", "right", "baton", "confirm"})
@@ -31,9 +42,6 @@ BatonChange: TypeAlias = Literal["taken", "handed", "forced", "dropped", "fell",
 _NAMED: Final = 4
 _DAY_US: Final = 86_400_000_000
 _MOST_DRILLS: Final = 20  # of a robot within a day
-#: Pages are asked about once a second.
-MIN_PRESENCE_S: Final = 3.0
-_LONGEST_PRESENCE_S: Final = 3600.0
 
 
 class Operator(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -45,42 +53,6 @@ class Operator(msgspec.Struct, frozen=True, omit_defaults=True):
     until: int | None = None
 
 
-class PagePresence(msgspec.Struct, frozen=True, kw_only=True):
-    """The rule that the page of whoever is responsible for a run stays visible. Seconds without an
-    answer of one: after `wait_s` a led run begins nothing further, after `stop_s` each run is
-    stopped."""
-
-    wait_s: float
-    stop_s: float
-
-    @property
-    def fault(self) -> str:
-        """The reason why this cannot be a rule, as a sentence; "" if it can."""
-        if not MIN_PRESENCE_S <= self.wait_s <= self.stop_s <= _LONGEST_PRESENCE_S:
-            return (
-                f"A page counts as missing after {MIN_PRESENCE_S:g} s or later; Stop follows then or "
-                f"later, after {_LONGEST_PRESENCE_S:g} s at most."
-            )
-        return ""
-
-    def words(self, robot: str, *, is_led: bool) -> str:
-        """Return the sentences for whoever starts a run on a robot."""
-        if is_led:
-            what = (
-                f"after {self.wait_s:g} s nothing further begins, and after {self.stop_s:g} s the run "
-                "is stopped."
-            )
-        else:
-            what = (
-                f"after {self.stop_s:g} s the run is stopped. It cannot be made to wait before that: "
-                "the engine has all of it."
-            )
-        return (
-            f"{robot} asks for a visible page of whoever starts there or holds its baton. Without "
-            f"one {what} This is no enabling device."
-        )
-
-
 class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there; None: every operator.
     `baton`: only its holder may; `watched`: each start has the word of its person that they watch
@@ -88,7 +60,8 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     confirm again that it is they who start, 0 where nobody is asked; `drill_days`: the last Stop drill
     passed, and is so many days old at most; `released_only`: only versions start there that an owner
     has released; `limits`: of the numbers that are sent there; `hardware_stop`: where it
-    is reported, None where it is not; `page_presence`: None where no page has to stay visible."""
+    is reported, None where it is not; `page_presence`: None where no page has to stay visible; `health`:
+    that is looked at before a start."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
@@ -99,6 +72,7 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     limits: tuple[Limit, ...] = ()
     hardware_stop: HardwareStop | None = None
     page_presence: PagePresence | None = None
+    health: tuple[HealthCheck, ...] = ()
 
 
 class Claim(msgspec.Struct, frozen=True, kw_only=True):
@@ -107,7 +81,8 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True):
     watch; `is_drill`: the start is for a Stop drill, which may be due; `beyond`: it gives values to
     inputs that the graph does not leave open; `limits`: those by robot to which all that is sent was
     held, with what is `over` them; None where each piece is held to them by itself, as it leaves;
-    `is_led`: the runner leads it."""
+    `is_led`: the runner leads it; `is_start`: a run begins with it, so that the health of its robots is
+    asked about."""
 
     digest: str
     watching: frozenset[str] = frozenset()
@@ -116,6 +91,7 @@ class Claim(msgspec.Struct, frozen=True, kw_only=True):
     limits: Limits | None = None
     over: tuple[OverLimit, ...] = ()
     is_led: bool = False
+    is_start: bool = False
 
 
 class Holder(msgspec.Struct, frozen=True):

@@ -12,9 +12,11 @@ import msgspec
 
 from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.health import HealthNow
 from action_assistant.runner.links.observations import Seen
 from action_assistant.runner.runs.author import Author as Author
 from action_assistant.runner.runs.earlier import Before, Earlier, StartFrom
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.question_events import (
     AnswerRefused,
     PauseBegan,
@@ -142,6 +144,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     before: Before | None = None  # the course of the run that it continues
     repeat: PartOfRepeat | None = None  # of which it is a cell
     limits: dict[str, tuple[Limit, ...]] = {}  # in force on its robots at the start
+    pages: dict[str, PagePresence] = {}  # the rules about visible pages there
+    health: dict[str, tuple[HealthNow, ...]] = {}  # as its robots reported it
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -625,8 +629,8 @@ def decode(kind: str, body: bytes) -> RunEvent:
 
 #: Fields of events that are for programs, or too large to be read; people may search all other texts.
 _NOT_SEARCHED: Final = frozenset({
-    "actions", "address", "aid", "at", "before", "by", "earlier", "digest", "piece", "graph", "group", "hash", "id", "incarnation", "inner_laps",
-    "laps", "limits", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
+    "actions", "address", "aid", "at", "before", "by", "earlier", "digest", "piece", "graph", "group", "hash", "health", "id", "incarnation", "inner_laps",
+    "laps", "limits", "pages", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
     "version",
 })  # fmt: skip
 

@@ -5,6 +5,7 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.health import HealthNow
 from action_assistant.runner.links.observations import ACTIVE, TERMINAL
 from action_assistant.runner.runs.earlier import Earlier, StartFrom
 from action_assistant.runner.runs.events import (
@@ -19,6 +20,7 @@ from action_assistant.runner.runs.events import (
     PieceOf,
     PieceRest,
 )
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.question_events import ClosedWhy, PauseBegan, QuestionAsked
 from action_assistant.runner.runs.visits import ActionRun, Message
 from action_assistant.umrf.breakpoints import Breakpoint
@@ -188,6 +190,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     start_from: StartFrom | None = None  # where it begins, if not at the entry
     earlier: Earlier | None = None  # all that it takes for granted then
     limits: dict[str, tuple[Limit, ...]] = {}  # in force on its robots at its start, or last change
+    pages: dict[str, PagePresence] = {}  # the rules about visible pages at its start
+    health: dict[str, tuple[HealthNow, ...]] = {}  # as its robots reported it at its start
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

@@ -26,6 +26,7 @@ from action_assistant.runner.runs.events import (
     Override,
     PartOfRepeat,
 )
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.question_views import (
     AnswerShown,
     PauseShown,
@@ -41,7 +42,7 @@ from action_assistant.runner.runs.run import Answer, Desired, Result, Run, Said,
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.sight import HIDDEN_NAME
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
-from action_assistant.safe_text import hold_names
+from action_assistant.safe_text import hold_names, sentence
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.limits import Limit
@@ -317,7 +318,8 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
     `tree_digest`: of the graph together with them, null if the starter did not send it; `earlier`: what
     it takes for granted, null if it began at the entry; `limits`: those of its robots at the start,
-    or at the last change of its graph."""
+    or at the last change of its graph; `pages`: the rules about visible pages at the start; `health`: a
+    sentence for each thing that its robots reported then."""
 
     umrf: UmrfGraph
     override: Override | None
@@ -328,6 +330,8 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     tree_digest: str | None
     earlier: EarlierShown | None = None
     limits: dict[str, tuple[Limit, ...]] = {}
+    pages: dict[str, PagePresence] = {}
+    health: dict[str, tuple[str, ...]] = {}
 
 
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -427,6 +431,11 @@ def whole_view(
         tree_digest=graph.tree_digest,
         earlier=None if run.earlier is None else earlier_view(run.earlier, run.start_from),
         limits=run.limits,
+        pages=run.pages,
+        health={
+            robot: tuple(sentence(each.sentence()) for each in found)
+            for robot, found in run.health.items()
+        },
     )
 
 

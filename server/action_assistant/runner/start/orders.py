@@ -37,6 +37,7 @@ def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
         limits=None if ready is None else ready.limits,
         over=() if ready is None else ready.over,
         is_led=request.engine == CONDUCTED,
+        is_start=True,
     )
 
 

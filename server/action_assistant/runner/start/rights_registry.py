@@ -19,6 +19,7 @@ from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, Refused, Unavailable
 from action_assistant.runner.links.hardware_stop import HardwareStop
+from action_assistant.runner.links.health import HealthCheck, HealthNow
 from action_assistant.runner.links.port import SIMULATOR, NotSent
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import (
@@ -27,13 +28,13 @@ from action_assistant.runner.robots.rights import (
     Drilled,
     Holder,
     Lock,
-    PagePresence,
     Refusal,
     RightsEvent,
     RobotRights,
     Rules,
 )
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.preflight import Item, Verdict
 from action_assistant.umrf.limits import Limit, Limits
@@ -106,6 +107,7 @@ class RightsRegistry:
         self._news = anyio.Event()
         #: Returns why the hardware stop of a robot counts as pressed, as a sentence; "" if it does not.
         self.why_pressed: Callable[[str], str] = _not_pressed
+        self.health_now: Callable[[str], tuple[HealthNow, ...]] = _no_health
 
     def take_up(self, rows: Iterable[Row[Any]]) -> None:
         """Take over what is stored, and begin to watch the holders of batons. The time after which a
@@ -160,6 +162,12 @@ class RightsRegistry:
         if rules[0].hardware_stop != rules[1].hardware_stop:
             text = f"Where {robot} reports its hardware stop is just changing, and not stored yet."
             found = (Refusal("pressed", text), *found)
+        if claim is not None and claim.is_start:
+            found += tuple(
+                Refusal("health", each.sentence())
+                for each in self.health_now(robot)
+                if each.consequence == "block"
+            )
         if claim is not None and any(each.released_only for each in rules):
             found += self._not_released(robot, claim)
         if claim is not None:
@@ -185,10 +193,23 @@ class RightsRegistry:
             wait_s=min(decided.wait_s, stored.wait_s), stop_s=min(decided.stop_s, stored.stop_s)
         )
 
+    def health_of(self, robot: str) -> tuple[HealthCheck, ...]:
+        """Return what is checked of the health of a robot: also what is just being taken away."""
+        record = self._record(robot)
+        return tuple(dict.fromkeys(record.decided.rules.health + record.stored.rules.health))
+
     @property
     def asks_for_pages(self) -> bool:
         """Return whether a robot asks for visible pages."""
         return any(self.page_presence_of(name) is not None for name in self._robots.names)
+
+    def page_presences(self, robots: Iterable[str]) -> dict[str, PagePresence]:
+        """Return the rules in force about pages on these robots; robots without one are left out."""
+        return {name: rule for name in robots if (rule := self.page_presence_of(name))}
+
+    def health(self, robots: Iterable[str]) -> dict[str, tuple[HealthNow, ...]]:
+        """Return the health of these robots now; robots of which nothing is checked are left out."""
+        return {name: found for name in robots if (found := self.health_now(name))}
 
     def limits_of(self, robot: str) -> tuple[Limit, ...]:
         """Return the limits in force on a robot: also those that are just being taken away."""
@@ -293,6 +314,11 @@ class RightsRegistry:
                 f"The hardware stop of {robot} is not pressed: {rule.words()}. This is information."
             )
             found.append(Item(code="pressed", verdict="passed", text=text))
+        if claim.is_start:
+            for each in self.health_now(robot):
+                if each.consequence != "block":
+                    verdict: Verdict = "warned" if each.consequence == "warn" else "passed"
+                    found.append(Item(code="health", verdict=verdict, text=each.sentence()))
         page = self.page_presence_of(robot)
         if page is not None:
             found.append(self._page_item(robot, page, identity, claim))
@@ -600,6 +626,11 @@ class RightsRegistry:
 def _not_pressed(_robot: str) -> str:
     """Return "": before anybody listens to hardware stops."""
     return ""
+
+
+def _no_health(_robot: str) -> tuple[HealthNow, ...]:
+    """Return (): nobody has said that the health of a robot is checked."""
+    return ()
 
 
 def _subject(identity: Identity, is_asking: bool) -> str:

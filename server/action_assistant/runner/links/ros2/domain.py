@@ -34,10 +34,17 @@ from temoto_msgs.srv import UmrfGraphGet
 
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
 from action_assistant.runner.links.hardware_stop import TYPES, HardwareStop, StopSignal
+from action_assistant.runner.links.health import HEALTH_TYPES, HealthCheck, HealthSignal
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import Command, Feedback
 from action_assistant.runner.links.ros2.message_queue import MessageQueue
 from action_assistant.runner.links.ros2.outlets import Message, Outlet, Outlets, Topics, qos
+from action_assistant.runner.links.ros2.report_topics import (
+    health_in,
+    message_type,
+    pressed_in,
+    report_qos,
+)
 from action_assistant.runner.links.ros2.ros_values import (
     EMULATED,
     Endpoint,
@@ -46,7 +53,6 @@ from action_assistant.runner.links.ros2.ros_values import (
     OverheardCommand,
     RosValue,
 )
-from action_assistant.runner.links.ros2.stop_topics import message_type, pressed_in, stop_qos
 
 log: Final = logging.getLogger(__name__)
 
@@ -57,6 +63,11 @@ _PROCESS: Final = 12  # bytes of a gid that all endpoints of one process share
 _KIND: Final = "temoto_msgs/srv/UmrfGraphGet"
 _ACTORS: Final = 64
 _JOIN_S: Final = 2.0
+#: Types of messages that do not say who sends them, with what several publishers make unknown.
+_OF_ONE: Final = {
+    TYPES["bool"]: "the newest message need not be the stop's",
+    HEALTH_TYPES["battery"]: "the newest message need not be of this robot",
+}
 
 M = TypeVar("M", bound=Message)
 Clock: TypeAlias = Callable[[], int]
@@ -82,7 +93,7 @@ class Domain:
         self._loop = loop
         self._clock_us = clock_us
         self._subscribers = Listeners[RosValue]()
-        self._stop_listeners: dict[tuple[str, str], tuple[Callable[[Any], None], ...]] = {}
+        self._report_listeners: dict[tuple[str, str], tuple[Callable[[Any], None], ...]] = {}
         self._waiting = MessageQueue()
         self._handing: set[asyncio.Task[None]] = set()
         self._leaving = False
@@ -227,28 +238,50 @@ class Domain:
     def stop_signal(self, rule: HardwareStop, changed: Callable[[], None]) -> StopSignal:
         """Listen to a hardware stop from now on. `changed` is called on the event loop after a message
         that says another thing than the one before it. Raise RuntimeError if that is not possible."""
-        kind, read, topic = message_type(rule), pressed_in(rule), rule.full_topic
-        place = topic, TYPES[rule.kind]
+        read, topic = pressed_in(rule), rule.full_topic
 
         def heard(message: Message) -> None:
             pressed = read(message)
             if pressed is not None and signal.hear(pressed=pressed, at=time.monotonic()):
                 self._to_loop(changed)
 
-        def leave() -> None:
-            self._stop_listeners[place] = tuple(
-                each for each in self._stop_listeners[place] if each is not heard
-            )
+        place = topic, TYPES[rule.kind]
+        signal = _StopTopic(self._node, *place, lambda: self._leave_report(place, heard))
+        self._listen_to_report(place, message_type(rule.kind), heard)
+        return signal
+
+    def health_signal(self, check: HealthCheck) -> HealthSignal:
+        """Listen to something of a robot's health from now on. Raise RuntimeError if that is not
+        possible."""
+        read, topic = health_in(check), check.full_topic
+
+        def heard(message: Message) -> None:
+            reading = read(message)
+            if reading is not None:
+                signal.newest = reading, time.monotonic()
+
+        place = topic, HEALTH_TYPES[check.kind]
+        signal = _HealthTopic(self._node, *place, lambda: self._leave_report(place, heard))
+        self._listen_to_report(place, message_type(check.kind), heard)
+        return signal
+
+    def _listen_to_report(
+        self, place: tuple[str, str], kind: type[Any], heard: Callable[[Any], None]
+    ) -> None:
+        """Call `heard` with each message on a topic, of a type (`place`)."""
 
         def share(message: Message) -> None:
-            for listener in self._stop_listeners.get(place, ()):
+            for listener in self._report_listeners.get(place, ()):
                 listener(message)
 
-        signal = _StopTopic(self._node, *place, leave)
-        if place not in self._stop_listeners:
-            self._node.create_subscription(kind, topic, share, stop_qos())
-        self._stop_listeners[place] = (*self._stop_listeners.get(place, ()), heard)
-        return signal
+        if place not in self._report_listeners:
+            self._node.create_subscription(kind, place[0], share, report_qos())
+        self._report_listeners[place] = (*self._report_listeners.get(place, ()), heard)
+
+    def _leave_report(self, place: tuple[str, str], heard: Callable[[Any], None]) -> None:
+        self._report_listeners[place] = tuple(
+            each for each in self._report_listeners[place] if each is not heard
+        )
 
     # --- what comes by itself -----------------------------------------------------------------
 
@@ -346,8 +379,8 @@ class Domain:
                 log.exception("domain %d: a message could not be taken in", self.number)
 
 
-class _StopTopic(StopSignal):
-    """The newest message on a topic of a hardware stop, and who publishes there."""
+class _ReportTopic:
+    """A topic on which a robot reports something, and who publishes there."""
 
     def __init__(self, node: Node, topic: str, kind: str, leave: Callable[[], None]) -> None:
         super().__init__()
@@ -366,9 +399,17 @@ class _StopTopic(StopSignal):
         others = {each.topic_type for each in ends} - {self._kind}
         if others:
             return f"it is published as {others.pop()}, not as {self._kind}"
-        if self._kind == TYPES["bool"] and len(ends) > 1:
-            return f"{len(ends)} programs publish it, and the newest message need not be the stop's"
+        if self._kind in _OF_ONE and len(ends) > 1:
+            return f"{len(ends)} programs publish it, and {_OF_ONE[self._kind]}"
         return ""
+
+
+class _StopTopic(_ReportTopic, StopSignal):
+    """The newest message on a topic of a hardware stop, and who publishes there."""
+
+
+class _HealthTopic(_ReportTopic, HealthSignal):
+    """The newest message on a topic about a robot's health, and who publishes there."""
 
 
 def _absolute(path: str) -> str:

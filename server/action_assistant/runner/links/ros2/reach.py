@@ -12,6 +12,7 @@ import anyio.to_thread
 import rclpy
 
 from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
+from action_assistant.runner.links.health import HealthCheck, HealthSignal
 from action_assistant.runner.links.port import Candidate, Link, Registration, Sighting
 from action_assistant.runner.links.ros2.domain import Domain
 from action_assistant.runner.links.ros2.link import Ros2Link
@@ -57,10 +58,19 @@ class Ros2:
     ) -> StopSignal:
         """Listen to the hardware stop of a robot, as `Domain.stop_signal` does, on the robot's domain.
         Raise RuntimeError if that is not possible."""
+        return (await self._domain_of(registration, facts)).stop_signal(rule, changed)
+
+    async def health_signal(
+        self, registration: Registration, facts: EngineFacts, check: HealthCheck
+    ) -> HealthSignal:
+        """Listen to something of a robot's health, as `Domain.health_signal` does, on the robot's
+        domain. Raise RuntimeError if that is not possible."""
+        return (await self._domain_of(registration, facts)).health_signal(check)
+
+    async def _domain_of(self, registration: Registration, facts: EngineFacts) -> Domain:
         if registration.rmw not in {"", self.rmw}:
             raise RuntimeError(f"this runner does not speak {registration.rmw}")
-        domain = await self.domain(registration.domain, topics_of(facts))
-        return domain.stop_signal(rule, changed)
+        return await self.domain(registration.domain, topics_of(facts))
 
     async def domain(self, number: int, topics: Topics) -> Domain:
         """Return the domain `number`, in which this process takes part with these topics. The first

@@ -1,0 +1,3 @@
+class BatteryState:
+    percentage: float
+    def __init__(self, *, percentage: float = 0.0) -> None: ...
