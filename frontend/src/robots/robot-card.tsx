@@ -68,7 +68,9 @@ function robotSigns(robot: Robot, now: number): Sign[] {
     signs.push({ good: true, text });
   }
   if (robot.hardware_stop !== null) {
-    const text = robot.pressed || "Its hardware stop is not pressed, as it reports";
+    const text = robot.pressed
+      ? `${robot.pressed} What others start there meanwhile is not stopped from here.`
+      : "Its hardware stop is not pressed, as it reports";
     signs.push({ good: robot.pressed === "", text });
   }
   for (const { state, text, topic, heard_at } of robot.health) {

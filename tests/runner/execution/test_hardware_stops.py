@@ -16,6 +16,7 @@ from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Held, StopRequested
+from action_assistant.runner.start.admission import GroupRequest
 from runner.execution.test_conductor import led, shared
 from runner.harness import (
     ANN,
@@ -120,6 +121,10 @@ async def test_a_press_stops_the_run_and_a_release_starts_nothing() -> None:
         with pytest.raises(Conflict, match="The hardware stop of David is pressed") as refused:
             await control.start(order(sequence(), engine="David"), ANN)
         assert (refused.value.where or {})["item"] == "pressed"
+        asked = GroupRequest(umrf=order(sequence()).umrf, engines=("David",))
+        (look,) = await control.look(asked, ANN.id)
+        (item,) = (each for each in look.items if each.code == "pressed")
+        assert item.text.endswith("What others start there meanwhile is not stopped from here.")
         topic.says = False
         await anyio.sleep(30)
         assert (pressed(control), len(david.starts), control.open) == ("", 1, {})

@@ -8,17 +8,18 @@ import pytest
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.port import Order, Registration
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.start.approvals import ApprovalRequest
-from action_assistant.umrf.facts import SECOND_PERSON
+from action_assistant.umrf.facts import PINNED, SECOND_PERSON
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.limits import Limit
-from action_assistant.umrf.model import Action
+from action_assistant.umrf.model import Action, Graph
 from runner.harness import Harness, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, change, fleet, group
 from runner.start.test_rights_registry import ANN, OLGA, author, david, lab
+from runner.start.test_starts_again import nested
 from umrf.test_limits import parameter, task
 
 TORQUE = Limit(parameter="torque", most=60)
@@ -136,3 +137,48 @@ async def test_another_version_and_a_resume_are_held_to_the_limits_of_that_momen
 def replaced(action: Action) -> Action:
     """The action with a torque of 80."""
     return msgspec.structs.replace(action, inputs=(parameter("torque", "number", 80),))
+
+
+def test_a_change_to_a_graph_that_only_the_robot_has_cannot_be_held_to_limits() -> None:
+    """The engine looks up sub-graphs in a change, which brings none of their values."""
+
+    class Changing(Pausing):
+        sent = 0
+
+        async def modify(self, order: Order, continue_from: str = "") -> None:
+            """Count what leaves."""
+            self.sent += 1
+
+    @virtual
+    async def asked() -> None:
+        david = Changing(NEVER)
+        david.known_graphs = (codec.write(inner_task(80)),)
+        async with fleet(Harness(), David=david) as control:
+            david.facts = msgspec.structs.replace(PINNED, restart_matches=True)
+            control.robots.reachable("David").facts = david.facts
+            await control.rights.set_rules("David", LIMITED, OLGA)
+            run = (await control.start(order(sequence("outer"), engine="David"), author(ANN))).run
+            await until(lambda: control.open[run.id].run.state == "running")
+            with pytest.raises(Conflict, match="cannot be held to the limits of David"):
+                await control.modify(run.id, change(nested()), author(ANN))
+            assert david.sent == 0
+            control.stop_all(author(ANN))
+            await until(lambda: not control.open)
+
+    asked()
+
+
+@virtual
+async def test_a_start_of_a_graph_that_only_the_robot_has_cannot_be_held_to_limits() -> None:
+    david = Open(NEVER)
+    david.known_graphs = (codec.write(inner_task(80)),)
+    async with fleet(Harness(), David=david) as control:
+        await control.rights.set_rules("David", LIMITED, OLGA)
+        with pytest.raises(Conflict, match="the robot would run what nobody has seen here"):
+            await control.start(order(nested(), engine="David"), author(ANN))
+        assert david.starts == []
+
+
+def inner_task(torque: float) -> Graph:
+    """The graph of the action `Inner` of `nested`."""
+    return msgspec.structs.replace(task(parameter("torque", "number", torque)), name="Inner")

@@ -30,7 +30,7 @@ from action_assistant.runner.start.admission import (
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.orders import claim_of, order_of, watched_in
-from action_assistant.runner.start.preflight import not_matched_in
+from action_assistant.runner.start.preflight import not_matched_in, unseen_graphs_in
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.limits import Limits
 from action_assistant.web.auth.graph_seals import Sight
@@ -126,6 +126,8 @@ async def modify(
         order = order_of(start, ready.digest, (), limits)
         await approvals.require(engine.registration, order, author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
+        if limits.get(run.engine):
+            await _require_held(engine, run, ready.umrf, run_in_worker)
     _require_moving(opened.run)  # it may have been stopped meanwhile
     if ready.name != run.graph_name:
         raise Conflict(
@@ -202,6 +204,23 @@ async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInW
             f"{engine.registration.name} does not look up {', '.join(lost[:3])} in a change, and would "
             "abort with every running graph. Stop the run and start the new version under another name.",
             where={"path": "/umrf/actions"},
+        )
+
+
+async def _require_held(
+    engine: KnownEngine, run: Run, umrf: str, run_in_worker: RunInWorker
+) -> None:
+    """Raise Conflict if an action of the changed graph (`umrf`: its text) stands for a graph: a change
+    brings no graphs inside, so that their values are held to no limit."""
+    held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
+    index = await engine.index(run_in_worker)
+    unseen = await run_in_worker(unseen_graphs_in, umrf, index, held, tuple(run.inner))
+    if unseen:
+        name = engine.registration.name
+        raise Conflict(
+            f"{', '.join(unseen[:3])} stands for a graph that {name} has. Its values cannot be held to the "
+            f"limits of {name}: a change brings no graphs inside. Stop the run, and start the new version.",
+            where={"path": "/umrf/actions", "item": "limit"},
         )
 
 

@@ -396,6 +396,26 @@ def not_matched_in(
     return not_matched(codec.read(umrf).graph, facts, index, held)
 
 
+def unseen_graphs_in(
+    umrf: str, index: EngineIndex, held: Collection[str], inner: Collection[str]
+) -> tuple[str, ...]:
+    """Read a graph as it will be sent, without graphs inside, and return the names of its actions that
+    stand for a graph: one in `index`, in `held`, which names the graphs that the engine holds, or in
+    `inner`, which names those that the run began with. For workers."""
+    graph = codec.read(umrf).graph
+    shown = {
+        each.name
+        for each in graph.actions
+        if not each.missing and f"{graph.name}__{each.name}__{each.instance_id}" in held
+    }
+    return tuple(sorted({*_unseen_graphs(graph, index, inner), *shown}))
+
+
+def _unseen_graphs(graph: Graph, index: EngineIndex, inner: Collection[str] = ()) -> set[str]:
+    names = {each.name for each in graph.actions if not each.missing}
+    return names & ({*index.graphs, *inner} - index.actions.keys())
+
+
 def _listed(names: Sequence[str]) -> str:
     first = ", ".join(names[:_NAMED])
     return first if len(names) <= _NAMED else f"{first} and {len(names) - _NAMED} more"
@@ -490,9 +510,12 @@ def _named_in(graph: Graph) -> frozenset[str]:
     return frozenset(each.actor for each in graph.actions if not each.missing)
 
 
-def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]:
+def subgraph_items(
+    view: EngineView, pinned: Mapping[str, Graph], *, limited: bool = False
+) -> tuple[Item, ...]:
     """Return the item about the graphs inside: an engine runs what it has indexed under a name,
-    whatever was sent (docs/umrf-and-the-engine.md 2.6). Empty where there are no graphs inside."""
+    whatever was sent (docs/umrf-and-the-engine.md 2.6). Empty where there are no graphs inside.
+    `limited`: the robot has limits, to which only what was sent can be held."""
     if not pinned:
         return ()
     index = view.index
@@ -501,6 +524,9 @@ def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item,
             f"{view.name} names no graphs, so whether it runs {_listed(sorted(pinned))} as this version "
             "has it cannot be said."
         )
+        if limited:
+            text += f" Its values cannot be held to the limits of {view.name}."
+            return (Item(code="subgraphs", verdict="blocked", text=text),)
         return (Item(code="subgraphs", verdict="warned", text=text),)
     lacking, other = differing_subgraphs(view, pinned)
     if not lacking and not other:
@@ -516,6 +542,9 @@ def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item,
             f"{view.name} has indexed {_listed(other)} otherwise than this version has it, and would "
             "run what it has."
         )
+    if other and limited:
+        sentences.append(f"Its values cannot be held to the limits of {view.name}.")
+        return (Item(code="subgraphs", verdict="blocked", text=" ".join(sentences)),)
     codes = (*(["subgraph-differs"] if other else []), *(["unknown-action"] if lacking else []))
     item = Item(
         code="subgraphs", verdict="blocked", text=" ".join(sentences), codes=codes, overridable=True
@@ -565,8 +594,15 @@ def engine_items(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) ->
         *robot_items(view, graph, pinned.values()),
         *_library_items(view, graph, prefixes),
         *_value_items(view, ready.handing),
-        *(_with_folder(each, view, pinned) for each in subgraph_items(view, pinned)),
-        *(_graphs_in_places_of_actions(view, graph, pinned) if ready.is_led else ()),
+        *(
+            _with_folder(each, view, pinned)
+            for each in subgraph_items(view, pinned, limited=view.name in ready.limits)
+        ),
+        *(
+            _graphs_in_places_of_actions(view, graph, pinned)
+            if ready.is_led or view.name in ready.limits
+            else ()
+        ),
     )
 
 
@@ -577,9 +613,7 @@ def _graphs_in_places_of_actions(
     version; () if there are no such actions. Their pieces would have the same name at each visit,
     and an engine aborts when it starts a name with a sub-graph again
     (docs/decisions/026-names-that-are-held.md)."""
-    names = {each.name for each in graph.actions if not each.missing}
-    known = view.index.graphs.keys() - view.index.actions.keys() - pinned.keys()
-    taken = sorted(names & known)
+    taken = sorted(_unseen_graphs(graph, view.index) - pinned.keys())
     if not taken:
         return ()
     text = (

@@ -45,6 +45,8 @@ from action_assistant.web.auth.rights import Denied, may
 
 log: Final = logging.getLogger(__name__)
 
+_OF_OTHERS: Final = "What others start there meanwhile is not stopped from here."
+
 #: Seconds after which a baton falls whose holder has no page open.
 GONE_S: Final = 1800.0
 _POLL_S: Final = 1.0  # between two looks at the sessions of holders
@@ -288,7 +290,14 @@ class RightsRegistry:
         """Return the items of a pre-flight: none for a robot without rules on which everybody with
         the role may start. `claim`: the claim of the start."""
         refused = self.refusals(robot, identity, claim, is_asking=is_asking)
-        found = [Item(code=each.code, verdict="blocked", text=each.text) for each in refused]
+        found = [
+            Item(
+                code=each.code,
+                verdict="blocked",
+                text=f"{each.text} {_OF_OTHERS}" if each.code == "pressed" else each.text,
+            )
+            for each in refused
+        ]
         rules, blocked = self.of(robot).rules, {each.code for each in refused}
         if rules.operators is not None and "right" not in blocked:
             text = f"{_subject(identity, is_asking)} among those who may start on {robot}."
