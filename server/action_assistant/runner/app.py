@@ -49,7 +49,7 @@ from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs import photos
+from action_assistant.runner.runs import photos, queries
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.photos import Photos
 from action_assistant.runner.runs.sight import RunSight
@@ -109,7 +109,6 @@ async def open_services(
         keep = _keep(settings)
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; workers compute
         recordings = Recordings(_folders(settings)["recordings"], on_disk, prunes=keep.raw is None)
-        services.photos = Photos(settings.data / photos.FOLDER, on_disk)
         archive_store = ArchiveStore(journal, keep.folder, on_disk)
         storage = StoragePaths(_file(settings), keep.folder)
         async with _executing(services, archive_store, recordings, storage) as control:
@@ -121,7 +120,12 @@ async def open_services(
                 archive_store, utc_us, services.worker_queries, control.next_number
             )
 
+            services.photos = Photos(
+                settings.data / photos.FOLDER, on_disk, partial(_answers_of, control)
+            )
+
             def review(opened: OpenRun) -> None:
+                services.photos.run_changed(opened.run)
                 if not opened.is_led:  # a piece is a part of its run
                     services.review_service.run_changed(opened.run, opened.recorder)
 
@@ -137,6 +141,7 @@ async def open_services(
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(services.review_service.run)
                 tasks.start_soon(services.retention.run)
+                tasks.start_soon(services.photos.run)
                 tasks.start_soon(index_words, journal)
                 public = settings.reached.public
                 services.notifications = Notifications(
@@ -157,6 +162,18 @@ async def open_services(
                 tasks.cancel_scope.cancel()
     finally:
         await journal.close()
+
+
+async def _answers_of(control: ExecutionService, run: str) -> list[str]:
+    """Return all answers of a run as JSON texts: those that are stored, and those that are just being."""
+    await control.history.requested(run)  # it is in the journal, and not archived
+    stored = await control.history.rows(queries.answers_of(run))
+    opened = control.open.get(run)
+    newest = {} if opened is None else opened.run.answers
+    return [
+        *(str(row.body) for row in stored),
+        *(each.value for given in newest.values() for each in given),
+    ]
 
 
 def _identity_now(

@@ -86,6 +86,8 @@ def test_people_answer_over_http_the_first_counts_and_a_restart_asks_again(
         assert third["id"] != second["id"]
         assert client.post(f"{path}/{third['id']}/answer", json={"value": name}).status_code == 400
         again = client.post(f"{path}/{third['id']}/photo", content=_JPEG).json()["photo"]
+        other = client.post(f"{path}/{third['id']}/photo", content=_JPEG + b"other").json()
+        assert client.get(f"/api/runs/{run}/photos/{other['photo']}").status_code == 200
         taken = client.post(f"{path}/{third['id']}/answer", json={"value": again})
         assert taken.status_code == 200, taken.text
         ended = over(client, run)
@@ -98,6 +100,11 @@ def test_people_answer_over_http_the_first_counts_and_a_restart_asks_again(
         assert picture.headers["content-type"] == "image/jpeg"
         assert picture.headers["x-content-type-options"] == "nosniff"
         assert "default-src 'none'" in picture.headers["content-security-policy"]
+        deadline = time.monotonic() + 20  # one that nobody has answered with is removed
+        while client.get(f"/api/runs/{run}/photos/{other['photo']}").status_code != 404:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert client.get(f"/api/runs/{run}/photos/{again}").content == _JPEG
         assert client.get(f"/api/runs/{run}/photos/%2e%2e%2ftoken").status_code == 404
         closed = client.get(path).json()["closed"]
         assert [each.get("why") for each in closed] == [None, "restarted", None]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, NoReturn
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound
+from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Refused
 from action_assistant.runner.execution.asked_steps import Given, OpenQuestion, value_of
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.led_commands import LedCommands, claim_of, operator_of
@@ -124,7 +124,12 @@ class QuestionCommands:
         if it is no photo, TooLarge if there are too many."""
         await self.require_photo(run, question, author, identity)
         photo = await photos.store(run, content)
-        known = await self._open_one(run, question, author)  # it may have closed meanwhile
+        try:
+            known = await self._open_one(run, question, author)  # it may have closed meanwhile
+        except Refused:
+            if (await self._find(run)).end is not None:
+                await photos.sweep(run)
+            raise
         self._conductors.add_photo(run, known, photo)
         return PhotoStored(photo)
 

@@ -26,6 +26,7 @@ from sqlalchemy import (
 from sqlalchemy.sql.selectable import TableValuedAlias
 
 from action_assistant.runner.links.port import CONDUCTED
+from action_assistant.runner.runs.question_events import QuestionAnswered
 from action_assistant.runner.runs.sight import Unseen
 from action_assistant.schema.runner_tables import (
     FAILED,
@@ -61,6 +62,14 @@ def streams_of_pieces(run_id: str | ColumnElement[str], having: str = "") -> Sel
     stream, own = runner_event.c.stream, literal("run/") + run_id
     found = select(stream).distinct().where(stream > own + ".", stream < own + "/")
     return found.where(runner_event.c.kind == having) if having else found
+
+
+def answers_of(run_id: str) -> Select[Any]:
+    """Select the bodies of all answers of people to questions of a run."""
+    event = runner_event.c
+    return select(event.body).where(
+        event.stream == f"run/{run_id}", event.kind == QuestionAnswered.kind
+    )
 
 
 def by_request(request_id: str) -> Select[Any]:
