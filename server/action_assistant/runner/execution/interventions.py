@@ -30,7 +30,7 @@ from action_assistant.runner.start.admission import (
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.orders import claim_of, order_of, watched_in
-from action_assistant.runner.start.preflight import not_matched_in, unseen_graphs_in
+from action_assistant.runner.start.robot_graphs import not_matched_in, unseen_graphs_in
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.limits import Limits
 from action_assistant.web.auth.graph_seals import Sight

@@ -34,6 +34,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.runner.start.built_libraries import older_libraries
+from action_assistant.runner.start.robot_graphs import not_matched, unseen_graphs
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.check import check, forbids_start, is_final
@@ -364,58 +365,6 @@ def _again(view: EngineView, graph: Graph) -> Item:
     return Item(code="again", verdict="blocked", text=text)
 
 
-def not_matched(
-    graph: Graph, facts: EngineFacts, index: EngineIndex, held: Collection[str]
-) -> tuple[str, ...]:
-    """Return the full names of the actions in `graph` that an engine cannot build.
-
-    Some engines (`facts.restart_matches` is false) do not look actions up in their index when a
-    graph is modified, or started under a name that they hold. Such an engine cannot build
-    sub-graphs and actions that are not in `index`. If `index` is empty, return only the actions
-    that stand for a graph in `held`, the running names that the engine holds. Empty for all other
-    engines."""
-    if facts.restart_matches:
-        return ()
-    silent = not index.actions and not index.graphs
-    return tuple(
-        action.full_name
-        for action in graph.actions
-        if not action.missing
-        and (
-            f"{graph.name}__{action.name}__{action.instance_id}" in held
-            if silent
-            else action.name not in index.actions
-        )
-    )
-
-
-def not_matched_in(
-    umrf: str, facts: EngineFacts, index: EngineIndex, held: Collection[str]
-) -> tuple[str, ...]:
-    """Read a graph as it will be sent and return its `not_matched`. For workers."""
-    return not_matched(codec.read(umrf).graph, facts, index, held)
-
-
-def unseen_graphs_in(
-    umrf: str, index: EngineIndex, held: Collection[str], inner: Collection[str]
-) -> tuple[str, ...]:
-    """Read a graph as it will be sent, without graphs inside, and return the names of its actions that
-    stand for a graph: one in `index`, in `held`, which names the graphs that the engine holds, or in
-    `inner`, which names those that the run began with. For workers."""
-    graph = codec.read(umrf).graph
-    shown = {
-        each.name
-        for each in graph.actions
-        if not each.missing and f"{graph.name}__{each.name}__{each.instance_id}" in held
-    }
-    return tuple(sorted({*_unseen_graphs(graph, index, inner), *shown}))
-
-
-def _unseen_graphs(graph: Graph, index: EngineIndex, inner: Collection[str] = ()) -> set[str]:
-    names = {each.name for each in graph.actions if not each.missing}
-    return names & ({*index.graphs, *inner} - index.actions.keys())
-
-
 def _listed(names: Sequence[str]) -> str:
     first = ", ".join(names[:_NAMED])
     return first if len(names) <= _NAMED else f"{first} and {len(names) - _NAMED} more"
@@ -613,7 +562,7 @@ def _graphs_in_places_of_actions(
     version; () if there are no such actions. Their pieces would have the same name at each visit,
     and an engine aborts when it starts a name with a sub-graph again
     (docs/decisions/026-names-that-are-held.md)."""
-    taken = sorted(_unseen_graphs(graph, view.index) - pinned.keys())
+    taken = sorted(unseen_graphs(graph, view.index) - pinned.keys())
     if not taken:
         return ()
     text = (
