@@ -45,6 +45,14 @@ class Part(NamedTuple):
 
 
 PARTS: Final[dict[str, Part]] = {
+    "reported": Part(
+        "200 histories of a hardware stop that is reported; a grid of 60 runs of which one fails",
+        {"TEST_STOP_HISTORIES": "200", "TEST_LONG": "1"},
+        (
+            *("-s", "tests/runner/execution/test_hardware_stops.py"),
+            *("tests/runner/repeats/test_repeats.py", "-k", "random_histories or sixty"),
+        ),
+    ),
     "kills": Part(
         "1,000 × kill -9 of a process at 8 chosen points and at any",
         {"TEST_KILLS": "1000"},

@@ -1,7 +1,12 @@
 """Hardware stops that robots report: what counts as pressed, what that blocks and stops, what opens again."""
 
+import os
+import random
+import sys
+from collections import Counter
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
+from itertools import pairwise
 from typing import Any
 
 import anyio
@@ -15,8 +20,9 @@ from action_assistant.runner.links.port import Registration
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Rules
-from action_assistant.runner.runs.events import Held, StopRequested
-from action_assistant.runner.start.admission import GroupRequest
+from action_assistant.runner.runs.events import Ended, Held, Requested, StopRequested
+from action_assistant.runner.runs.views import time
+from action_assistant.runner.start.admission import GoOnRequest, GroupRequest
 from runner.execution.test_conductor import led, shared
 from runner.harness import (
     ANN,
@@ -37,6 +43,7 @@ from runner.repeats.test_repeats import pressed as pressed_next
 STOP = HardwareStop(topic="estop", age_s=1.0)
 RULES = Rules(hardware_stop=STOP)
 SLOW: dict[str, Any] = {"*": [{"after_s": 60}]}
+HISTORIES = int(os.environ.get("TEST_STOP_HISTORIES", "4"))
 
 
 class Topic(StopSignal):
@@ -291,3 +298,100 @@ def test_a_topic_of_diagnostics_needs_the_name_of_the_status() -> None:
     rule = HardwareStop(topic="/diagnostics", kind="diagnostics")
     assert "Name the status" in rule.fault
     assert msgspec.structs.replace(rule, status="estop").fault == ""
+
+
+class Heard(Topic):
+    """A topic that notes its messages: when each came, in microseconds, and whether it meant pressed."""
+
+    def __init__(self) -> None:
+        super().__init__(says=False)
+        self.messages: list[tuple[int, bool]] = []
+
+    def hear(self, *, pressed: bool, at: float) -> bool:
+        """Note a message."""
+        self.messages.append((clock_us(), pressed))
+        return super().hear(pressed=pressed, at=at)
+
+    def before(self, at: int) -> tuple[int, bool]:
+        """Return the newest message before a time."""
+        return max(each for each in self.messages if each[0] < at)
+
+    def presses_at(self) -> list[int]:
+        """Return when the topic began to say *pressed*."""
+        pairs = pairwise(self.messages)
+        return [at for (_, before), (at, pressed) in pairs if pressed and not before]
+
+
+class Left(list[Any]):
+    """The messages that a robot got, with their times in microseconds."""
+
+    def __init__(self, times: list[int]) -> None:
+        super().__init__()
+        self._times = times
+
+    def append(self, sent: Any) -> None:
+        """Note a message, and when it left."""
+        self._times.append(clock_us())
+        super().append(sent)
+
+
+async def live(control: ExecutionService, topic: Heard, pick: random.Random) -> None:
+    """Start, let go on, press and release by chance for half a minute."""
+    for _ in range(150):
+        if pick.random() < 0.06:
+            topic.says = pick.choice([True, False, False, None])
+        chance = pick.random()
+        with suppress(Refused):
+            if chance < 0.1:
+                await control.start(order(sequence(), engine="David"), ANN)
+            elif chance < 0.2:
+                await control.start(led(shared(sequence("task", 4), "Scout", "Carrier")), ANN)
+            elif chance < 0.4:
+                for run, opened in tuple(control.open.items()):
+                    held = opened.run.held
+                    if held is not None:
+                        await control.go_on(run, GoOnRequest(time(held.at)), ANN)
+        await anyio.sleep(0.2)
+
+
+@virtual
+async def test_in_random_histories_nothing_leaves_while_the_stop_counts_and_all_is_stopped() -> (
+    None
+):
+    counts = Counter[str]()
+    for seed in range(HISTORIES):
+        topic, harness, pick = Heard(), Harness(), random.Random(seed)
+        left = list[int]()
+        david, carol = Open({"*": [{"after_s": 2}]}), Open({"*": [{"after_s": 2}]})
+        david.starts, carol.starts = Left(left), Left(left)
+        async with lab(topic, harness, David=david, Carol=carol) as control:
+            await live(control, topic, pick)
+            control.stop_all(ANN)
+            topic.says = False
+            await until(lambda: not control.open, 60)
+        for at in left:
+            heard, pressed = topic.before(at)
+            assert not pressed, seed
+            assert at - heard <= 1_000_000, seed
+        runs = [
+            each.removeprefix("run/") for each in harness.journal.streams if each.startswith("run/")
+        ]
+        for run in runs:
+            told = harness.journal.told(run)
+            if not told or not isinstance(told[0], Requested):
+                continue
+            counts["runs"] += 1
+            ends = [each.at for each in told if isinstance(each, Ended)]
+            stops = [each.at for each in told if isinstance(each, StopRequested)]
+            for at in topic.presses_at():
+                if told[0].at < at and not any(each < at for each in (*ends, *stops)):
+                    counts["stopped"] += 1
+                    near = [each for each in (*stops, *ends) if at <= each <= at + 300_000]
+                    assert near, (seed, run)
+            if told[0].led is not None and stops:
+                first = next(each for each in told if isinstance(each, Held | StopRequested))
+                counts["gate first"] += isinstance(first, Held)
+        counts["left"] += len(left)
+    sys.stdout.write(f"\n{HISTORIES} histories: {dict(counts)}\n")
+    assert counts["stopped"] >= HISTORIES // 2, counts
+    assert counts["gate first"], counts

@@ -1,5 +1,6 @@
 """Repeats: cells are started once each, on robots by a person alone, and a reason closes them at once."""
 
+from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused, Unavailable
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.simulator import in_this_process
 from action_assistant.runner.repeats.repeat import (
     Axis,
     NextRequest,
@@ -24,6 +26,7 @@ from action_assistant.runner.repeats.repeat import (
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Requested
+from action_assistant.umrf.facts import EngineFacts
 from runner.execution.test_conductor import Lab as LedLab
 from runner.execution.test_conductor import led, shared
 from runner.harness import (
@@ -170,6 +173,47 @@ async def test_a_run_that_fails_closes_the_repeat_and_a_person_opens_it_again_fo
         assert again.reopened.author == author(BEN)
         assert await closed(repeats, repeat) == "run"
         assert lab.cells() == [1, 2]
+
+
+class FailingAt:
+    """Simulated engines of which one fails: that of the start with this number."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.made = 0
+
+    def __call__(self, facts: EngineFacts, script: str, *more: Any) -> Any:
+        """Return the engine for a start."""
+        self.made += 1
+        if self.made == self.number:
+            script = '{"behaviours": {"*": [{"result": "on_error"}]}}'
+        return in_this_process(facts, script, *more)
+
+
+@pytest.mark.long
+@virtual
+async def test_a_grid_of_sixty_of_which_one_fails_closes_there_and_ends_with_each_cell_once() -> (
+    None
+):
+    lab = Lab()
+    places = Axis("Work_1", "place", tuple(f"valve_{n}" for n in range(4)))
+    start = order(asking(), request_id="press", script=QUICK)
+    request = RepeatRequest(start=start, times=5, grid=(places, TORQUES), seed=7, by_itself=True)
+    assert len(cells_of(request)) == 60
+    lab.harness.simulator = FailingAt(37)
+    async with lab.runner() as (_, repeats):
+        repeat = await opened(repeats, request)
+        assert await closed(repeats, repeat) == "run"
+        assert lab.cells() == list(range(1, 38))
+        await anyio.sleep(600)
+        assert len(lab.cells()) == 37  # it waits for a person
+        await repeats.reopen(repeat.id, ReopenRequest(1), author(BEN), BEN)
+        assert await closed(repeats, repeat) == "complete"
+        assert lab.cells() == list(range(1, 61))
+        assert [each.values for each in lab.starts()] == list(repeat.opened.cells)
+        results = [lab.harness.journal.history(each.run).result for each in lab.starts()]
+        assert Counter(results) == {"on_true": 59, "on_error": 1}
+        assert results[36] == "on_error"
 
 
 @virtual
