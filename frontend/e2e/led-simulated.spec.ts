@@ -124,8 +124,8 @@ test("a run asks people, on every page, and their first answer is its outcome", 
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("finished");
   await page.setViewportSize({ width: 1440, height: 900 });
   const answers = page.getByRole("list", { name: "Answered" });
-  await expect(answers).toContainText(/AaConfirm 0: yes, by .?Ada/);
-  await expect(answers).toContainText(/AaChoose 0: right, by .?Ada/);
+  await expect(answers).toContainText(/Confirm 0: yes, by .?Ada/);
+  await expect(answers).toContainText(/Choose 0: right, by .?Ada/);
 });
 
 test("on the canvas of a run people let it wait at an action and an arrow, and go on until one", async () => {

@@ -102,7 +102,7 @@ test("two robots run one graph: the page says whose run it shows, and shows the 
   await begin(graph, "David", "Eve");
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
-  const robots = strip(page).getByRole("tablist", { name: "Robots that run this graph" });
+  const robots = strip(page).getByRole("tablist", { name: "Who runs this graph" });
   await expect(robots.getByRole("tab")).toHaveCount(3);
   const both = robots.getByRole("tab", { name: "Both robots" });
   await expect(both).toHaveAttribute("aria-selected", "true");

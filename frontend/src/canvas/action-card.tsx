@@ -7,6 +7,7 @@ import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { createContext, memo, type ReactNode, use, useRef } from "react";
 import type { Action, Key } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
+import { shownName } from "../graph/questions";
 import { durationText } from "../status/durations";
 import { type Progress, visitsText } from "../status/progress";
 import { StateLabel, useInStep } from "../status/state-label";
@@ -60,7 +61,7 @@ function Head({ action, oldName }: { action: Action; oldName: string | null }) {
       <b className={style.name} title={action.name}>
         {action.missing && <IconGhost2 size={13} aria-hidden />}
         {oldName && <del>{oldName}</del>}
-        {action.name}
+        {shownName(action.name)}
       </b>
       {action.instanceId > 0 && (
         <span className="ink3 text-12_25 tabular">{action.instanceId}</span>

@@ -4,6 +4,7 @@ import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
 import { spokenNote } from "../graph/note-links";
 import { cardRows } from "../graph/parameters/card-rows";
+import { shownName } from "../graph/questions";
 import { type HandOver, handOverLabel, robotNames, robotOf } from "../graph/robots";
 import { colorsAmong, firstLetter } from "../ui/name-colors";
 import { type Bundle, bundlesOf, type HandOvers, handOversIn, pillWord } from "./arrows/bundles";
@@ -175,7 +176,12 @@ class Painter {
     return [
       `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="12" fill="${this.paint("--raised")}" stroke="${this.paint("--line2")}"${dash}/>`,
       `<rect x="${x + 5}" y="${y + 12}" width="3" height="${height - 24}" rx="1.5" fill="${robot}"/>`,
-      this.text(fitted(action.name, width - 60, 7.4), x + 16, y + 25, `${ink} font-weight="600"`),
+      this.text(
+        fitted(shownName(action.name), width - 60, 7.4),
+        x + 16,
+        y + 25,
+        `${ink} font-weight="600"`,
+      ),
       this.text(
         String(action.instanceId),
         x + width - 13,

@@ -32,6 +32,7 @@ import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import { linkableNames, linkedAction } from "../graph/note-links";
 import type { ProblemGroup } from "../graph/problems/problem-groups";
+import { shownName } from "../graph/questions";
 import { endName } from "../graph/relation-words";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
@@ -65,7 +66,9 @@ function EditorContextProvider({ context, children }: ProviderProps) {
     () => ({
       target(link) {
         const action = linkedAction(graph.actions, link);
-        return action && { key: action.key, label: `${action.name} ${action.instanceId}` };
+        return (
+          action && { key: action.key, label: `${shownName(action.name)} ${action.instanceId}` }
+        );
       },
       open(key) {
         select([key]);

@@ -5,6 +5,7 @@ import { relationId } from "../graph/document-keys";
 import { endLabel, pathWords, valueText } from "../graph/field-words";
 import { ENTRY, type Graph, type Key, PRECONDITIONS } from "../graph/model";
 import { placeOf } from "../graph/problems/problem-groups";
+import { shownName } from "../graph/questions";
 import { isolated } from "../words/isolated";
 
 export interface Hit {
@@ -37,7 +38,7 @@ const titleOf = (graph: Graph, key: Key): string => {
   const end = endLabel(key);
   if (end !== null) return end;
   const action = graph.actions.find((candidate) => candidate.key === key);
-  return action ? `${action.name} ${action.instanceId}` : "";
+  return action ? `${shownName(action.name)} ${action.instanceId}` : "";
 };
 
 function entriesOf(graph: Graph, problems: readonly Problem[]): SearchEntry[] {

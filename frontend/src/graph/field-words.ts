@@ -5,6 +5,7 @@
 
 import { memberText } from "./json-members";
 import type { Key, Parameter } from "./model";
+import { shownName } from "./questions";
 
 /** Words by the key of a field in the document; a key that stands for itself is not listed. */
 const WORDS: Readonly<Record<string, string>> = {
@@ -44,7 +45,7 @@ export function spokenName(fullName: string): string {
   if (end !== null) return end;
   const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
   if (own === undefined) return fullName || "an action";
-  return number === "0" ? own || "an action" : `${own} ${number}`;
+  return number === "0" ? shownName(own) || "an action" : `${shownName(own)} ${number}`;
 }
 
 /** Return the name of the entry or the exit; null for an action. */

@@ -2,8 +2,10 @@
 
 import templates from "../api/schema/ready-made.json";
 
-/** Names by which the runner knows them. */
-const READY_MADE: ReadonlySet<string> = new Set(templates.map(({ name }) => name));
+/** What people call them, by the names by which the runner knows them. */
+const READY_MADE: ReadonlyMap<string, string> = new Map(
+  templates.map(({ name, title }) => [name, title]),
+);
 
 const WAITS: ReadonlySet<string> = new Set(["AaWait", "AaUntil"]);
 
@@ -16,6 +18,11 @@ interface Named {
 /** Return whether no robot plays this action. */
 export function isReadyMade({ name }: Pick<Named, "name">): boolean {
   return READY_MADE.has(name);
+}
+
+/** Return the name of an action as people read it: `AaConfirm` is *Confirm*. Fields have the name itself. */
+export function shownName(name: string): string {
+  return READY_MADE.get(name) ?? name;
 }
 
 /** Return the roles that a graph asks, sorted, without "" (nobody in particular). */

@@ -18,6 +18,7 @@ import {
   type Relation,
   type Response,
 } from "./model";
+import { shownName } from "./questions";
 import { handOverOf, robotOf, robotWord } from "./robots";
 
 /** Words for how an action ended, after its name: "Scan ends true". */
@@ -35,7 +36,8 @@ export function nameOf(graph: Graph, key: Key): string {
   const action = graph.actions.find((candidate) => candidate.key === key);
   if (action === undefined) return "something deleted";
   const shared = graph.actions.some((other) => other !== action && other.name === action.name);
-  return shared ? fullName(action) : action.name;
+  const name = shownName(action.name);
+  return shared ? fullName({ ...action, name }) : name;
 }
 
 /** Returns what one arrow makes its child do, one sentence for each thing. */

@@ -5,6 +5,7 @@ import type { ReactNode } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, renameDocument, setField } from "../graph/edit";
 import type { Action } from "../graph/model";
+import { shownName } from "../graph/questions";
 import { DraftInput } from "../ui/draft-input";
 import { ArrowList } from "./arrow-list";
 import { ActionBreakpoint } from "./breakpoint-field";
@@ -33,7 +34,7 @@ function Ghost({ action }: { action: Action }) {
       <div>
         Arrows name{" "}
         <b>
-          {action.name} {action.instanceId}
+          {shownName(action.name)} {action.instanceId}
         </b>
         , but the graph has no such action. The graph cannot be started like this.
         <Group mt="sm">

@@ -24,6 +24,7 @@ import type { Note } from "../graph/edit/notes";
 import { cardLines, lineText } from "../graph/field-words";
 import type { Relation } from "../graph/model";
 import { spokenNote } from "../graph/note-links";
+import { shownName } from "../graph/questions";
 import { handOverLabel, handOverOf, type RobotOf, robotWord } from "../graph/robots";
 import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
@@ -93,7 +94,7 @@ function PartWords({ row }: { row: InsideRow }) {
   return (
     <span className={style.head}>
       <b>
-        <bdi>{action.name}</bdi> {action.instanceId}
+        <bdi>{shownName(action.name)}</bdi> {action.instanceId}
       </b>
       {progress && (
         <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
@@ -141,7 +142,7 @@ export function Words({ row, progress, name, robots }: WordsProps) {
         <>
           <span className={style.head}>
             <b>
-              {action.name} {action.instanceId}
+              {shownName(action.name)} {action.instanceId}
             </b>
             <Talk of={action.key} />
             {progress && (

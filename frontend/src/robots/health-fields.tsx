@@ -58,7 +58,7 @@ function CheckFields({ check, name, onChange, onRemove }: FieldsProps) {
   const number = (value: string | number, before: number) =>
     typeof value === "number" ? value : before;
   return (
-    <Stack gap="xs" w="100%" role="group" aria-label={name}>
+    <Stack gap="xs" w="100%" role="group" aria-label={isolated(name)}>
       <Group grow align="end">
         <Select
           size="xs"
@@ -133,7 +133,7 @@ function CheckFields({ check, name, onChange, onRemove }: FieldsProps) {
           value={check.unknown}
           onChange={(value) => onChange({ unknown: follows(value) })}
         />
-        <Button size="xs" aria-label={`Remove ${name}`} onClick={onRemove}>
+        <Button size="xs" aria-label={`Remove ${isolated(name)}`} onClick={onRemove}>
           Remove
         </Button>
       </Group>
@@ -165,7 +165,7 @@ export function HealthFields({ drafts, onChange }: Props) {
         <CheckFields
           key={each.key}
           check={each}
-          name={isolated(each.status || each.topic || `check ${index + 1}`)}
+          name={each.status || each.topic || `check ${index + 1}`}
           onChange={(change) =>
             onChange(drafts.map((other) => (other === each ? { ...each, ...change } : other)))
           }

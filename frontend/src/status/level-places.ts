@@ -1,6 +1,7 @@
 /** Assigns the facts of a run to its levels: an engine names actions of sub-graphs `OUTER__NAME__ID/ACTION`. Pure.
  * The runner places by the same rule (docs/decisions/073-a-run-by-its-levels.md). */
 import type { Run } from "../api/runs";
+import { shownName } from "../graph/questions";
 
 /** Position of an action in the hierarchy of a run. */
 export interface LevelPlace {
@@ -97,7 +98,8 @@ export function factOf(graph: string, way: readonly string[]): string {
 
 /** An action as people call it: `Grip_0` is Grip 0. */
 export function spaced(fullName: string): string {
-  return fullName.replace(/_(\d+)$/, " $1");
+  const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
+  return own === undefined ? fullName : `${shownName(own)} ${number}`;
 }
 
 /** The way to an action, in words. */

@@ -12,6 +12,7 @@ import {
 } from "../document-keys";
 import { endLabel } from "../field-words";
 import type { Graph, Key } from "../model";
+import { shownName } from "../questions";
 import { isEqual } from "../values";
 import { asOneEdit, graphNow } from "./document-writes";
 
@@ -117,7 +118,7 @@ function placeOf(graph: Graph, { root, key, before, after }: DocumentChange): st
     const label = endLabel(end);
     if (label !== null) return label;
     const action = graph.actions.find((candidate) => candidate.key === end);
-    return action ? `${action.name} ${action.instanceId}` : "a new action";
+    return action ? `${shownName(action.name)} ${action.instanceId}` : "a new action";
   };
   if (ends) return `${isolated(name(ends.parent))} → ${isolated(name(ends.child))}`;
   if (root === "positions" && head.startsWith("g/")) return "notes";

@@ -10,7 +10,7 @@ import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
 import { Answers } from "../../status/answers";
 import { RunQuestions } from "../../status/held-notice";
-import { type Lane, robotsOf, useLanes } from "../../status/lanes/lanes";
+import { isRobot, type Lane, performerWords, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
 import { runLabel, type Tone } from "../../status/progress";
 import { RestList } from "../../status/rest-list";
@@ -57,7 +57,7 @@ function toldOf(run: Run): string {
 
 function RobotTabList({ tabs }: { tabs: readonly RobotTab[] }) {
   return (
-    <Tabs.List className={style.tabs ?? ""} aria-label="Robots that run this graph">
+    <Tabs.List className={style.tabs ?? ""} aria-label="Who runs this graph">
       <Tabs.Tab value={ALL_ROBOTS}>{allWords(tabs)}</Tabs.Tab>
       {tabs.map(({ id, robot, tone, words }) => (
         <Tabs.Tab key={id} value={id}>
@@ -275,7 +275,7 @@ export function robotTabs(
   if (runs.length === 1 && only !== undefined && actors.length > 1) {
     return actors.map((actor) => {
       const names = new Set(lanes.filter(({ robot }) => robot === actor).map(({ name }) => name));
-      const robot = actor === "" ? "any robot" : actor;
+      const robot = performerWords(actor);
       const unknown = unheard || (Boolean(only.robots) && silent.has(actor));
       const stops = !unheard && only.desired === "stopped" && !only.ended_at;
       const rest = stops ? knownRest(only, actor) : null;
@@ -296,5 +296,6 @@ export function robotTabs(
 }
 
 export function allWords(tabs: readonly RobotTab[]): string {
+  if (tabs.some(({ actor }) => actor !== null && !isRobot(actor))) return "All";
   return tabs.length === 2 ? "Both robots" : `All ${tabs.length} robots`;
 }

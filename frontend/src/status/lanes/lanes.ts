@@ -102,6 +102,19 @@ export function openLanes<One extends Pick<Lane, "name" | "around">>(
   });
 }
 
+/** Who carries out actions that no robot does, as runs call them, and as people read them. */
+const NO_ROBOTS: ReadonlyMap<string, string> = new Map([
+  ["people", "People"],
+  ["runner", "The runner"],
+]);
+
+/** Return whether this is a robot, and not people or the runner. */
+export const isRobot = (performer: string): boolean => !NO_ROBOTS.has(performer);
+
+/** Return who carries actions out, as people read it. */
+export const performerWords = (performer: string): string =>
+  NO_ROBOTS.get(performer) ?? (performer === "" ? "any robot" : performer);
+
 /** Returns the robots of the lanes, in the order of the lanes. */
 export function robotsOf(lanes: readonly Lane[]): string[] {
   return [...new Set(lanes.map((lane) => lane.robot))];

@@ -30,7 +30,7 @@ import {
 } from "./axis";
 import { type HandOver, HandOverLines, handOversOf, handOverWords } from "./hand-overs";
 import { AllLevels, LaneRow, type OpenLanes, useOpenLanes } from "./lane-row";
-import { type Lane, openLanes, robotsOf } from "./lanes";
+import { type Lane, openLanes, performerWords, robotsOf } from "./lanes";
 import style from "./timeline.module.css";
 
 interface Props extends Track {
@@ -251,7 +251,7 @@ function Groups({ track, axis, named, overs, inside, ...props }: GroupsProps) {
       {named && (
         <li className={style.robot} style={{ color: colorOfName(robot) }}>
           <i style={{ background: colorOfName(robot) }} aria-hidden />
-          <bdi>{robot === "" ? "any robot" : robot}</bdi>
+          <bdi>{performerWords(robot)}</bdi>
         </li>
       )}
       {lanes
