@@ -82,6 +82,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
     "drafts": CommandEntry("drafts", "drafts of a graph: list, new, merge", described=True),
     "runs": CommandEntry("runs", "list the runs, newest first", described=True),
+    "queue": CommandEntry("queue", "list what waits for robots, in its order", described=True),
     "release": CommandEntry(
         "remote", "release a version, or withdraw that: robots may take no other"
     ),

@@ -97,6 +97,31 @@ def test_a_repeat_is_followed_listed_and_written_as_a_table(
     assert "is not asked for" in wrong.stderr
 
 
+def test_a_start_waits_in_the_queue_and_is_listed_started_and_removed(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    waits = product.cli("run", graph, "--script", files["endless"], "--queue")
+    assert waits.returncode == 0, waits.stderr
+    assert "its turn" in waits.stdout
+    behind = product.cli("run", graph, "--script", files["quick"], "--queue")
+    entry = behind.stdout.split()[0]
+    listed = product.cli("queue").stdout
+    assert entry in listed
+    refused = product.cli("queue", "start", entry)
+    assert refused.returncode != 0
+    assert "simulator" in refused.stderr
+    closed = product.cli("queue", "close", "simulator").stdout
+    assert "closed: simulator" in closed
+    opened = product.cli("queue", "open", "simulator").stdout
+    assert "closed" not in opened
+    assert entry in product.cli("queue", "move", entry).stdout
+    assert product.cli("queue", "remove", entry).stdout == "removed\n"
+    assert product.cli("queue").stdout == ""
+    assert "not in the queue" in product.cli("queue", "start", entry).stderr
+    product.cli("stop", "--all")
+
+
 def test_sub_graphs_run_with_their_graph(product: Product, files: dict[str, str]) -> None:
     imported(product, files["graph"])
     end = {"graph_entry": [{"name": "pair"}], "graph_exit": [{"name": "pair"}]}
