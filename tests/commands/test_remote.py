@@ -110,7 +110,7 @@ def test_a_start_waits_in_the_queue_and_is_listed_started_and_removed(
     assert entry in listed
     refused = product.cli("queue", "start", entry)
     assert refused.returncode != 0
-    assert "simulator" in refused.stderr
+    assert "The simulator is not free." in refused.stderr
     closed = product.cli("queue", "close", "simulator").stdout
     assert "closed: simulator" in closed
     opened = product.cli("queue", "open", "simulator").stdout

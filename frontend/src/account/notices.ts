@@ -27,10 +27,10 @@ const LOST: Readonly<Record<string, string>> = {
   restarted: "has a new engine process",
 };
 
-type Live = Pick<LiveState, "runs" | "engines">;
+type Live = Pick<LiveState, "runs" | "engines" | "queue">;
 
 /** Return all facts that hold now, of runs on robots and of unread mentions. */
-export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): Notice[] {
+export function noticesOf({ runs, engines, queue }: Live, inbox: Inbox | undefined): Notice[] {
   const found: Notice[] = [];
   for (const run of runs.values()) {
     if (run.simulated) continue;
@@ -65,6 +65,10 @@ export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): No
       const text = `${isolated(robot)} ${how}, and ${rest}`;
       found.push({ key: `robot.lost:${robot}:${run.id}`, text, path });
     }
+  }
+  if (queue && queue.yours > 0) {
+    const text = "It is the turn of a start that you have put into the queue.";
+    found.push({ key: `queue.ready:${queue.ready_at}`, text, path: "/runs/queue" });
   }
   for (const mention of inbox?.mentions ?? []) {
     if (mention.is_read) continue;

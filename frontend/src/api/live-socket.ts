@@ -46,6 +46,8 @@ export interface LiveState {
   stops: readonly StopRequest[];
   /** Requests of the person's other devices that this page can answer, while the link is live. */
   asked: readonly AskedConfirmation[];
+  /** The last message about the queue; nothing waits without one. */
+  queue?: RunnerApi["QueueMessage"] | undefined;
 }
 
 type RunnerMessage = RunnerApi["RunnerMessage"];
@@ -293,6 +295,7 @@ export class LiveSocket {
           since: tick(),
           engines: message.engines,
           runs,
+          queue: undefined, // it is said anew if something waits
         });
         break;
       }
@@ -307,6 +310,9 @@ export class LiveSocket {
         break;
       case "confirm":
         this.#set({ asked: message.asked });
+        break;
+      case "queue":
+        this.#set({ queue: message });
         break;
       case "engines":
         this.#set({ engines: message.engines });

@@ -2,6 +2,7 @@
 import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
 import { ComparePage } from "../review/compare-page";
+import { QueuePage } from "../review/queue-page";
 import { RepeatPage, RepeatsPage } from "../review/repeat-page";
 import type { RepeatActions } from "../review/run-menu";
 import { RunPage } from "../review/run-page";
@@ -26,7 +27,12 @@ export function RunsScreen() {
   );
 }
 
+/** The page below `/runs/`: no run has the id `queue`. */
 export function RunScreen({ id }: { id: string }) {
+  return id === "queue" ? <QueueScreen /> : <OneRun id={id} />;
+}
+
+function OneRun({ id }: { id: string }) {
   useTitle("Run");
   return (
     <PageFrame>
@@ -54,6 +60,15 @@ function Again({ engines, onClose, ...what }: RepeatActions & { onClose: () => v
         onClose={onClose}
       />
     </OverlayBoundary>
+  );
+}
+
+function QueueScreen() {
+  useTitle("Queue");
+  return (
+    <PageFrame>
+      <QueuePage bar={(parts) => <PageBar at="runs" {...parts} />} />
+    </PageFrame>
   );
 }
 

@@ -25,6 +25,7 @@ import {
 } from "../api/review";
 import type { Run } from "../api/runs";
 import { Empty } from "../ui/empty";
+import { QueueLink } from "./queue-page";
 import { RunFilters } from "./run-filters";
 import { RunList, type RunOfList } from "./run-list";
 import style from "./runs-page.module.css";
@@ -168,6 +169,7 @@ export function RunsPage() {
           <Button component={Link} to="/runs/repeats" size="compact-sm" variant="subtle">
             Repeats
           </Button>
+          <QueueLink />
           {waiting > 0 && (
             <Button size="compact-sm" variant="light" onClick={() => void listed.refetch()}>
               {waiting === 1 ? "1 new run" : `${waiting} new runs`}

@@ -2,11 +2,13 @@
 import { Button, Code, Skeleton } from "@mantine/core";
 import { IconPlus, IconRadar2, IconRobot } from "@tabler/icons-react";
 import { useState } from "react";
+import { Link } from "wouter";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import { type FoundEngine, type Registration, useFoundEngines, useRosReach } from "../api/robots";
 import { Empty } from "../ui/empty";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { counted } from "../words/counted";
 import { RobotCard } from "./robot-card";
 import type { EditedRobot } from "./robot-form";
 import style from "./robots-page.module.css";
@@ -50,6 +52,7 @@ function NoReach({ why }: { why: string }) {
 export function RobotsPage({ onImport }: Props) {
   const { runner, now } = useLive();
   const may = useMay("register");
+  const queued = now.queue?.number ?? 0;
   const reach = useRosReach(runner).data;
   const [editing, setEditing] = useState<EditedRobot | null>(null);
   const known = now.link !== "connecting" || reach !== undefined;
@@ -81,6 +84,7 @@ export function RobotsPage({ onImport }: Props) {
           <h2 className="page-title">Robots</h2>
           {robots.length > 0 && button}
         </div>
+        {queued > 0 && <Link to="/runs/queue">{counted(queued, "start")} in the queue</Link>}
         {reach?.no_reach && <NoReach why={reach.no_reach} />}
         {!known && (
           <div aria-hidden>

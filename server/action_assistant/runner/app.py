@@ -254,7 +254,7 @@ async def _executing(
             services.repeats, services.queues = repeats, queues
             for_people.recorder_of = own.recorder_of = control.recorder_of
             services.worker_queries, services.control = for_people, control
-            services.hub = Hub(control, utc_us, services.requests, services.identity_now)
+            services.hub = Hub(control, utc_us, services.requests, services.identity_now, queues)
             services.index_writer = IndexWriter(
                 control.robots,
                 services.index_folders,

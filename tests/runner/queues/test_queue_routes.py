@@ -30,7 +30,7 @@ def test_a_person_looks_and_starts_what_waits_in_its_order(process: RunnerProces
     with process.client() as client:
         first, second = put(client, "first"), put(client, "second")
         assert (first["state"], second["state"]) == ("ready", "waiting")
-        assert second["waits"][0]["text"] == "It is behind 1 other for simulator."
+        assert second["waits"][0]["text"] == "It is behind 1 other for the simulator."
         path = f"/api/queue/{first['id']}"
         assert client.post(f"{path}/start", json={"look": "nothing"}).status_code == 409
         look = client.post(f"{path}/look", json={}).json()

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Refused, Unavailable
+from action_assistant.runner.api.live import Hub, Outbox, QueueMessage
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
@@ -142,6 +143,34 @@ async def test_a_start_waits_for_its_robot_and_then_for_a_person() -> None:
         await started(queues, second, BEN)
         assert queues.entries == ()
         assert len(lab.david.starts) == 3
+
+
+@virtual
+async def test_pages_are_told_how_much_waits_and_whose_turn_it_is() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        hub = Hub(control, clock_us, queues=queues)
+        run = await direct(control, "David")
+        await put(queues, on("David"))
+        assert hub.queue(ANN.person.id) == QueueMessage(1, 0, None)
+        box = Outbox(hub, lambda: True, BEN)
+        hub.boxes.add(box)
+        sent: list[str] = []
+
+        async def send(text: str) -> None:
+            if '"queue"' in text:
+                sent.append(text)
+
+        async with anyio.create_task_group() as pages:
+            pages.start_soon(box.deliver, send)
+            await over(control, run)
+            await anyio.sleep(1)
+            pages.cancel_scope.cancel()
+        assert [each.startswith('{"type":"queue","number":1,"yours":0') for each in sent] == [
+            True
+        ] * len(sent)
+        assert len(sent) >= 2
+        assert (hub.queue(ANN.person.id).yours, hub.queue(BEN.person.id).yours) == (1, 0)
 
 
 @virtual

@@ -1940,6 +1940,18 @@ export interface RunnerApi {
         run: string | null;
     };
     /**
+     * QueueMessage
+     * @description The queue has changed: so many starts wait in it, and of the person of this page so many may be
+     *     started now, the newest one since `ready_at`. The first message comes if something waits.
+     */
+    QueueMessage: {
+        /** @enum {string} */
+        type: "queue";
+        number: number;
+        yours: number;
+        ready_at: string | null;
+    };
+    /**
      * QueueRequest
      * @description Puts a start into the queue. `by_itself`: in the simulator alone, it starts when its turn comes.
      *     The `request_id` of the start names the entry: it is put there once.
@@ -2796,7 +2808,7 @@ export interface RunnerApi {
             [key: string]: string[];
         };
     };
-    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["ThereMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
+    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["QueueMessage"] | RunnerApi["ThereMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * SaidShown
      * @description A person's statement of the result of a visit that no answer has shown.

@@ -41,6 +41,7 @@ import {
   WayChoice,
 } from "./led-choice";
 import { PreflightList } from "./preflight-list";
+import { mayWait, QueueButton } from "./queue-choice";
 import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
 import { SecondPerson } from "./second-person";
 import { StartButton } from "./start-button";
@@ -415,27 +416,29 @@ export function StartDialog(props: Props) {
     setDrills(false);
     setEngines(toggled(whole, engine));
   };
+  const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
+  const sent = {
+    seq,
+    engines: asked,
+    ...(order && { led: order }),
+    digest,
+    ...(tree && { tree }),
+    behaviours,
+    ...said,
+    breakpoints: breakpoints ?? [],
+    values: values ?? {},
+  };
+  const waits =
+    mayRepeat && repeat === null && mayWait(looks) && (way.missing ?? given.obstacle) === null;
   const begin = () => {
     rememberEngines(graph, asked);
     if (order !== null) rememberLed(graph, order);
     onChosen([...asked]);
-    const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
     const done = ({ runs }: { runs: readonly Run[] }) => {
       setReason("");
       begins.forget();
       onClose();
       onStarted?.(runs);
-    };
-    const looked = { digest, ...(tree && { tree }) };
-    const sent = {
-      seq,
-      engines: asked,
-      ...(order && { led: order }),
-      ...looked,
-      behaviours,
-      ...said,
-      breakpoints: breakpoints ?? [],
-      values: values ?? {},
     };
     // Whoever starts says each time that they watch, and that it is for a drill.
     const onSettled = () => {
@@ -579,6 +582,9 @@ export function StartDialog(props: Props) {
           moves={led && way.missing === null ? movesWords(castFor(cast, moving)) : ""}
           values={values}
         />
+        {waits && (
+          <QueueButton graph={graph} wanted={{ ...sent, ...override }} onEntered={onClose} />
+        )}
         <StartButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
           label={why ?? (moves && !repeat ? "Hold to start" : what)}

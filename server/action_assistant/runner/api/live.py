@@ -31,6 +31,7 @@ from action_assistant.runner.api.confirmation_requests import (
 )
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.robots.registration import Robot, seen_by
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
@@ -129,6 +130,15 @@ class ConfirmMessage(msgspec.Struct, frozen=True, tag="confirm", tag_field="type
     asked: list[ConfirmationShown]
 
 
+class QueueMessage(msgspec.Struct, frozen=True, tag="queue", tag_field="type"):
+    """The queue has changed: so many starts wait in it, and of the person of this page so many may be
+    started now, the newest one since `ready_at`. The first message comes if something waits."""
+
+    number: int
+    yours: int
+    ready_at: datetime | None
+
+
 class ThereMessage(msgspec.Struct, frozen=True, tag="there", tag_field="type"):
     """Asks a page of an operator to answer if it is visible, while a robot asks for such pages."""
 
@@ -150,6 +160,7 @@ RunnerMessage: TypeAlias = (
     | RunMessage
     | EnginesMessage
     | ConfirmMessage
+    | QueueMessage
     | ThereMessage
     | Heartbeat
     | Stopping
@@ -211,8 +222,10 @@ class Hub:
         clock_us: ClockUs,
         requests: ConfirmationRequests | None = None,
         identity_now: IdentityNow = unchanged,
+        queues: Queues | None = None,
     ) -> None:
         self.control = control
+        self._queues = queues
         self.identity_now = identity_now
         self.requests = requests or ConfirmationRequests()
         self.clock_us = clock_us
@@ -227,6 +240,25 @@ class Hub:
         control.watch(self._changed)
         control.watch_robots(self._robots_changed)
         self.requests.watch(self._requests_changed)
+        if queues is not None:
+            queues.watch(self._queue_changed)
+
+    def _queue_changed(self) -> None:
+        for box in self.boxes:
+            box.mark_queue()
+
+    def queue(self, person: str) -> QueueMessage:
+        """Return the message about the queue for a person."""
+        entries = self._queues.entries if self._queues is not None else ()
+        ready = [
+            each.ready_at
+            for each in entries
+            if each.ready_at is not None
+            and each.entered.author.id == person
+            and (each.differs or not each.entered.by_itself)
+        ]
+        newest = views.time(max(ready)) if ready else None
+        return QueueMessage(len(entries), len(ready), newest)
 
     def _requests_changed(self, person: str) -> None:
         for box in self.boxes:
@@ -409,6 +441,7 @@ class Outbox:
         self._engines_at = math.inf  # when the engines are to be sent
         self._engines_next = 0.0  # not before
         self._has_requests = False
+        self._has_queue = hub.queue(identity.person.id).number > 0
         self._asked: deque[float] = deque(maxlen=_MOST_ASKED)  # when `there` was sent
         self._asks = 0  # how often it was
         self._news = anyio.Event()
@@ -428,6 +461,11 @@ class Outbox:
     def mark_requests(self) -> None:
         """Have the requests to confirm sent to the page, since one of its person has changed."""
         self._has_requests = True
+        self._news.set()
+
+    def mark_queue(self) -> None:
+        """Have it said to the page that the queue has changed."""
+        self._has_queue = True
         self._news.set()
 
     def here(self, number: int) -> None:
@@ -525,6 +563,9 @@ class Outbox:
         if self._has_requests:
             self._has_requests = False
             return _text(ConfirmMessage(self._hub.requests.shown_to(self.identity)))
+        if self._has_queue:
+            self._has_queue = False
+            return _text(self._hub.queue(self.identity.person.id))
         if now >= self._engines_at:
             engines = self._hub.engines(self._unseen)
             self._engines_at = math.inf
@@ -595,5 +636,7 @@ async def _write(socket: WebSocket[Any, Any, Any], hub: Hub, box: Outbox) -> Non
         pass
 
 
-def _text(message: Stopping | RefusedMessage | Heartbeat | ConfirmMessage | ThereMessage) -> str:
+def _text(
+    message: Stopping | RefusedMessage | Heartbeat | ConfirmMessage | QueueMessage | ThereMessage,
+) -> str:
     return msgspec.json.encode(message).decode()

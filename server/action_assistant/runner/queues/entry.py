@@ -293,3 +293,8 @@ def _require_none(blocked: Sequence[Item]) -> None:
 def lanes_of(robots: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the queues in which a start for these robots waits."""
     return tuple(robots) or (SIMULATOR,)
+
+
+def named(robot: str) -> str:
+    """Return the name of the robot of a queue in a sentence."""
+    return "the simulator" if robot == SIMULATOR else robot

@@ -45,6 +45,7 @@ from action_assistant.runner.queues.entry import (
     entry_id,
     lanes_of,
     looked_of,
+    named,
     order_of,
     request_of,
     require_openable,
@@ -463,11 +464,14 @@ class Queues:
             closed = self._lanes[each.robot].closed if each.why == "closed" else None
             where: dict[str, object] = {"robot": each.robot, "why": each.why}
             if closed is not None:
-                text = f"The queue of {each.robot} is closed. {closed.text}"
+                text = f"The queue of {named(each.robot)} is closed. {closed.text}"
                 raise Conflict(text, where=where | {"closing": closing_of(closed)})
             if each.why == "behind":
-                raise Conflict(f"{each.behind} before it wait for {each.robot}.", where=where)
-            raise Conflict(f"{each.robot} is not free.", where=where)
+                raise Conflict(
+                    f"{each.behind} before it wait for {named(each.robot)}.", where=where
+                )
+            text = named(each.robot)
+            raise Conflict(f"{text[0].upper()}{text[1:]} is not free.", where=where)
 
     async def _started(self, id_: str) -> Started:
         """Return the run that an entry has become. Raise NotFound if it has become none."""
@@ -519,7 +523,7 @@ class Queues:
     def _of(self, robot: str) -> Lane:
         lane = next((each for each in self.lanes if each.name == robot), None)
         if lane is None:
-            raise NotFound(f"Nothing waits for {robot}.")
+            raise NotFound(f"Nothing waits for {named(robot)}.")
         return lane
 
     def _close(self, lane: Lane, doubt: Doubt) -> None:
@@ -545,7 +549,7 @@ class Queues:
         be stored."""
         lane = self._of(robot)
         if lane.closed is None:
-            raise Conflict(f"The queue of {robot} is open.")
+            raise Conflict(f"The queue of {named(robot)} is open.")
         closed, before = lane.closed, lane.doubts
         if asked.closing != closing_of(closed):
             where: dict[str, object] = {"path": "/closing", "closing": closing_of(closed)}

@@ -6,7 +6,8 @@ from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.queues.entry import Wait, Waiting
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.queues.entry import Wait, Waiting, named
 from action_assistant.runner.queues.lanes import Entry, Lane, Look
 from action_assistant.runner.queues.service import Queues, closing_of
 from action_assistant.runner.runs.doubts import ClosedWhy
@@ -167,18 +168,23 @@ def _waiting(
     unseen: Unseen | None,
 ) -> WaitingShown:
     robot = wait.robot
+    name = named(robot)
     match wait.why:
         case "closed":
             closed = lanes[robot].closed
-            text = f"The queue of {robot} is closed. {'' if closed is None else closed.text}"
+            text = f"The queue of {name} is closed. {'' if closed is None else closed.text}"
         case "behind":
             others = "1 other" if wait.behind == 1 else f"{wait.behind} others"
-            text = f"It is behind {others} for {robot}."
+            text = f"It is behind {others} for {name}."
         case "stop":
-            text = f"Something is being stopped on {robot}."
+            text = f"Something is being stopped on {name}."
         case "run":
             run = run_of(wait.run)
-            text = f"{robot} is not free." if run is None else _running(robot, run, unseen)
+            text = "A run from here goes on."
+            if run is not None and robot == SIMULATOR:
+                text = f"Run {run.number} from the queue goes on in the simulator."
+            elif run is not None:
+                text = _running(robot, run, unseen)
     return WaitingShown(robot=robot, why=wait.why, text=text.strip(), run=wait.run or None)
 
 

@@ -1,0 +1,77 @@
+/** The queue: starts that wait for robots, and for a person. */
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
+import { useRef } from "react";
+import { runnerAt } from "./client";
+import { useLive } from "./page-link";
+import { type Run, type StartOrder, startBody, type Watching } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+export type Queue = RunnerApi["QueueShown"];
+export type QueueEntry = RunnerApi["EntryShown"];
+export type RobotQueue = RunnerApi["RobotQueueShown"];
+export type QueueLook = RunnerApi["LookShown"];
+
+/** Return how often a value became another one. */
+function useChanges(value: object | undefined): number {
+  const [count, last] = [useRef(0), useRef(value)];
+  if (last.current !== value) count.current += 1;
+  last.current = value;
+  return count.current;
+}
+
+/** Query the queue; anew whenever the runner says that it has changed. */
+export function useQueue() {
+  const { runner, now } = useLive();
+  return useQuery({
+    queryKey: ["queue", useChanges(now.queue)],
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/queue", { signal }),
+    enabled: runner !== undefined,
+    placeholderData: keepPreviousData,
+  });
+}
+
+/** Put a start into the queue of its robots, once; it is not sent again. Nothing starts by that. */
+export async function enterQueue(order: StartOrder): Promise<Queue> {
+  const [engine = ""] = order.engines;
+  const start = { ...(await startBody(order)), engine };
+  const body = { start } as RunnerApi["QueueRequest"];
+  return runnerAt(order.runner).post("/api/queue", { body });
+}
+
+/** Query what a look before the start of an entry finds now. */
+export function lookAtEntry(runner: string, entry: string, watching: Watching): Promise<QueueLook> {
+  const path = { entry };
+  return runnerAt(runner).post("/api/queue/{entry}/look", { path, body: { watching } });
+}
+
+/** Start an entry at its turn, exactly as it was looked at. */
+export function startEntry(
+  runner: string,
+  entry: string,
+  look: string,
+  watching: Watching,
+): Promise<Run> {
+  const path = { entry };
+  return runnerAt(runner).post("/api/queue/{entry}/start", { path, body: { look, watching } });
+}
+
+/** Move an entry before another one, or to the end by "". */
+export function moveEntry(runner: string, entry: string, before: string): Promise<Queue> {
+  const path = { entry };
+  return runnerAt(runner).post("/api/queue/{entry}/move", { path, body: { before } });
+}
+
+export function removeEntry(runner: string, entry: string): Promise<Queue> {
+  return runnerAt(runner).post("/api/queue/{entry}/remove", { path: { entry } });
+}
+
+/** Close the queue of a robot; a run that goes on is not stopped. */
+export function closeQueue(runner: string, robot: string): Promise<Queue> {
+  return runnerAt(runner).post("/api/queue/robots/{name}/close", { path: { name: robot } });
+}
+
+/** Open the closed queue of a robot again after a look. */
+export function openQueue(runner: string, robot: string, closing: string): Promise<Queue> {
+  const path = { name: robot };
+  return runnerAt(runner).post("/api/queue/robots/{name}/open", { path, body: { closing } });
+}

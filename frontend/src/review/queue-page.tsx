@@ -1,0 +1,346 @@
+/** The queue: which starts wait for which robots, why and in which order; at its turn a person looks and starts one. */
+import { Button, Skeleton } from "@mantine/core";
+import { IconAlertTriangle, IconHourglassEmpty } from "@tabler/icons-react";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import type { ReactNode } from "react";
+import { Link, useLocation } from "wouter";
+import { errorText } from "../api/http";
+import { useLive } from "../api/page-link";
+import { useMay, usePerson } from "../api/people";
+import {
+  closeQueue,
+  lookAtEntry,
+  moveEntry,
+  openQueue,
+  type Queue,
+  type QueueEntry,
+  type QueueLook,
+  type RobotQueue,
+  removeEntry,
+  startEntry,
+  useQueue,
+} from "../api/queue";
+import { lineWords, valueLines } from "../status/value-words";
+import { useWatching, WatchTicks } from "../status/watching";
+import { Empty } from "../ui/empty";
+import { HoldButton } from "../ui/hold-button";
+import { clock, day, instant, useNow } from "../ui/times";
+import { counted } from "../words/counted";
+import { isolated } from "../words/isolated";
+import style from "./queue-page.module.css";
+import type { RunBarParts } from "./run-page";
+
+const named = ({ robots }: QueueEntry): string =>
+  robots.length === 0 ? "in the simulator" : `on ${robots.map(isolated).join(", ")}`;
+
+const robotWords = (robot: string): string =>
+  robot === "simulator" ? "the simulator" : isolated(robot);
+
+/** Runs a command on the queue, whose answer is the queue as it is then. */
+function useCommand<T>(command: (runner: string) => Promise<T>) {
+  const { runner } = useLive();
+  const client = useQueryClient();
+  return useMutation({
+    mutationFn: async () => {
+      if (runner === undefined) throw new Error("The address of the runner is not known yet.");
+      return command(runner);
+    },
+    onSettled: () => client.invalidateQueries({ queryKey: ["queue"] }),
+  });
+}
+
+function Fault({ error }: { error: Error | null }) {
+  if (error === null) return null;
+  return (
+    <p role="alert" className={style.error}>
+      {errorText(error)}
+    </p>
+  );
+}
+
+/** The queue of one robot, where it is closed: why, and the button that opens it. */
+function Closed({ queue: { robot, closed } }: { queue: RobotQueue }) {
+  const may = useMay(robot === "simulator" ? "simulate" : "operate");
+  const open = useCommand((runner) => openQueue(runner, robot, closed?.closing ?? ""));
+  if (closed === null) return null;
+  return (
+    <section className={style.closed} aria-label={`The queue of ${robotWords(robot)}`}>
+      <p className="m-0">
+        <b>The queue of {robotWords(robot)} is closed.</b> {closed.text} Nothing of it starts until
+        a person has looked.
+      </p>
+      {may && (
+        <Button
+          size="compact-sm"
+          variant="default"
+          loading={open.isPending}
+          onClick={() => open.mutate()}
+        >
+          Look again, and open it
+        </Button>
+      )}
+      <Fault error={open.error} />
+    </section>
+  );
+}
+
+/** Closes the queue of a robot that is open. */
+function CloseButton({ robot }: { robot: string }) {
+  const close = useCommand((runner) => closeQueue(runner, robot));
+  return (
+    <>
+      <Button
+        size="compact-sm"
+        variant="subtle"
+        loading={close.isPending}
+        onClick={() => close.mutate()}
+      >
+        Close the queue of {robotWords(robot)}
+      </Button>
+      <Fault error={close.error} />
+    </>
+  );
+}
+
+/** Items of a look that are worth a line: what is in the way, and what is only noted. */
+function Items({ look }: { look: QueueLook }) {
+  const items = look.looks.flatMap(({ engine, items: each }) =>
+    each.map((item) => ({ engine, ...item })),
+  );
+  const worth = items.filter(({ verdict }) => verdict !== "passed");
+  return (
+    <ul className={style.items}>
+      {worth.map(({ engine, code, verdict, text }) => (
+        <li key={`${engine} ${code}`} data-verdict={verdict}>
+          {verdict === "blocked" ? "In the way: " : "Note: "}
+          {text}
+        </li>
+      ))}
+      <li className="ink2">{counted(items.length - worth.length, "check")} passed.</li>
+    </ul>
+  );
+}
+
+/** The look before the start of an entry whose turn it is, and the button that starts it. */
+function Turn({ entry }: { entry: QueueEntry }) {
+  const [, go] = useLocation();
+  const { live } = useLive();
+  const watch = useWatching(entry.robots);
+  const look = useCommand((runner) => lookAtEntry(runner, entry.id, watch.watching));
+  const found = look.data;
+  const start = useMutation({
+    mutationFn: (runner: string) => startEntry(runner, entry.id, found?.look ?? "", watch.watching),
+    onSuccess: (run) => {
+      live?.learn(run);
+      go(`/runs/${run.id}`);
+    },
+    onSettled: () => {
+      watch.forget();
+      look.reset();
+    },
+  });
+  const { runner } = useLive();
+  const blocked = (found?.looks ?? []).flatMap(({ items }) =>
+    items.filter(({ verdict, overridable, code }) =>
+      verdict === "blocked" ? !overridable && code !== "watched" : false,
+    ),
+  );
+  const what = `Start ${isolated(entry.graph_name)} ${named(entry)}`;
+  const why = watch.obstacle ?? (blocked.length > 0 ? "A check prevents the start" : null);
+  const differs = found?.differs ?? entry.differs;
+  const moves = entry.robots.length > 0;
+  const begin = () => runner !== undefined && start.mutate(runner);
+  return (
+    <section className={style.turn} aria-label={`Before the start of ${entry.graph_name}`}>
+      {differs.length > 0 && (
+        <div className={style.differs}>
+          <b>It is not as it was when it was put here:</b>
+          <ul>
+            {differs.map((each) => (
+              <li key={each}>{each}</li>
+            ))}
+          </ul>
+        </div>
+      )}
+      {found && <Items look={found} />}
+      {found && <WatchTicks watch={watch} />}
+      <div className={style.buttons}>
+        <Button
+          variant={found ? "subtle" : "filled"}
+          loading={look.isPending}
+          onClick={() => look.mutate()}
+        >
+          {found ? "Look again" : "Look before the start"}
+        </Button>
+        {found && moves && (
+          <HoldButton
+            label={why ?? "Hold to start"}
+            name={why === null ? what : `${what}: ${why}`}
+            question={`You have looked: ${what}?`}
+            disabled={why !== null || start.isPending}
+            onHeld={begin}
+          />
+        )}
+        {found && !moves && (
+          <Button
+            variant="filled"
+            disabled={why !== null}
+            loading={start.isPending}
+            onClick={begin}
+          >
+            {why ?? what}
+          </Button>
+        )}
+      </div>
+      <Fault error={start.error ?? look.error} />
+    </section>
+  );
+}
+
+function stateWords({ state, waits, by_itself }: QueueEntry): string {
+  if (waits.length > 0) return waits.map(({ text }) => text).join(" ");
+  if (state === "changed") return "Its turn. Something has changed: look before the start.";
+  return by_itself ? "Its turn: it starts by itself." : "Its turn: a person looks, and starts it.";
+}
+
+interface LineProps {
+  entry: QueueEntry;
+  place: number;
+  /** The entries before and after it. */
+  before: QueueEntry | undefined;
+  afterNext: QueueEntry | undefined;
+  isLast: boolean;
+}
+
+function Line({ entry, place, before, afterNext, isLast }: LineProps) {
+  const { person } = usePerson();
+  const mayStart = useMay(entry.robots.length > 0 ? "operate" : "simulate");
+  const now = useNow(60_000);
+  const up = useCommand((runner) => moveEntry(runner, entry.id, before?.id ?? ""));
+  const down = useCommand((runner) => moveEntry(runner, entry.id, afterNext?.id ?? ""));
+  const remove = useCommand((runner) => removeEntry(runner, entry.id));
+  const at = instant(entry.entered_at) ?? 0;
+  const isOwner = person.role === "owner";
+  const isOwn = isOwner || entry.author.id === person.id;
+  const mayRise = before !== undefined && (isOwner || before.author.id === person.id);
+  const values = valueLines(entry.values).map((line) => isolated(lineWords(line)));
+  return (
+    <li className={style.entry} data-state={entry.state}>
+      <div className={style.head}>
+        <span className="ink3">{place}</span>
+        <b className="fill">
+          <bdi>{entry.graph_name}</bdi> {named(entry)}
+        </b>
+        <span className="quiet-12">
+          <bdi>{entry.author.name}</bdi>, {day(at, now)} {clock(at)}
+        </span>
+      </div>
+      {values.length > 0 && <p className="m-0 quiet-12">With {values.join(", ")}.</p>}
+      <p className={style.state}>{stateWords(entry)}</p>
+      {entry.waits.length === 0 && mayStart && !entry.hidden && <Turn entry={entry} />}
+      {isOwn && (
+        <div className={style.buttons}>
+          {mayRise && (
+            <Button size="compact-xs" variant="subtle" onClick={() => up.mutate()}>
+              Move up
+            </Button>
+          )}
+          {!isLast && (
+            <Button size="compact-xs" variant="subtle" onClick={() => down.mutate()}>
+              Move down
+            </Button>
+          )}
+          <Button
+            size="compact-xs"
+            variant="subtle"
+            loading={remove.isPending}
+            onClick={() => remove.mutate()}
+          >
+            Remove
+          </Button>
+        </div>
+      )}
+      <Fault error={up.error ?? down.error ?? remove.error} />
+    </li>
+  );
+}
+
+function Found({ queue: { entries, robots } }: { queue: Queue }) {
+  if (entries.length === 0)
+    return (
+      <Empty icon={<IconHourglassEmpty size={22} />} title="Nothing waits">
+        Where a robot is not free, <b>Wait in the queue</b> stands beside the start.
+      </Empty>
+    );
+  return (
+    <>
+      {robots.map((each) => (
+        <Closed key={each.robot} queue={each} />
+      ))}
+      <ol className={style.list}>
+        {entries.map((entry, index) => (
+          <Line
+            key={entry.id}
+            entry={entry}
+            place={index + 1}
+            before={entries[index - 1]}
+            afterNext={entries[index + 2]}
+            isLast={index === entries.length - 1}
+          />
+        ))}
+      </ol>
+      <p className="quiet-12">
+        On a robot nothing starts by itself. Every Stop, and every doubt about a robot, closes its
+        queue.
+      </p>
+      <div className={style.buttons}>
+        {robots
+          .filter(({ closed }) => closed === null)
+          .map(({ robot }) => (
+            <CloseButton key={robot} robot={robot} />
+          ))}
+      </div>
+    </>
+  );
+}
+
+/** Link to the queue, with how much waits there; nothing while nothing does. */
+export function QueueLink() {
+  const { number = 0, yours = 0 } = useLive().now.queue ?? {};
+  if (number === 0) return null;
+  const turn = yours > 0 ? ": it is your turn" : "";
+  return (
+    <Button
+      component={Link}
+      to="/runs/queue"
+      size="compact-sm"
+      variant={yours > 0 ? "light" : "subtle"}
+    >
+      {`${counted(number, "start")} in the queue${turn}`}
+    </Button>
+  );
+}
+
+export function QueuePage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
+  const found = useQueue();
+  return (
+    <>
+      {bar({ crumbs: [{ label: "Runs", to: "/runs" }, { label: "Queue" }] })}
+      <main className="page">
+        <div className={style.inner}>
+          <div className="page-head">
+            <h2 className="page-title">Queue</h2>
+            <Link to="/robots">Robots</Link>
+          </div>
+          {found.isLoading && <Skeleton height={160} />}
+          {found.isError && !found.data && (
+            <Empty icon={<IconAlertTriangle size={22} />} title="The queue could not be loaded">
+              {errorText(found.error)}
+            </Empty>
+          )}
+          {found.data && <Found queue={found.data} />}
+        </div>
+      </main>
+    </>
+  );
+}
