@@ -59,7 +59,7 @@ test("what waits says why, is moved, closed by a Stop, opened after a look, and 
   await expect(closed).toContainText("pressed Stop of everything");
   await closed.getByRole("button", { name: "Look again, and open it" }).click();
   await expect(closed).toBeHidden();
-  const turn = line(page, "drive").getByRole("region", { name: "Before the start of drive" });
+  const turn = line(page, "drive").getByRole("region", { name: /^Before the start of/ });
   await turn.getByRole("button", { name: "Look before the start" }).click();
   await expect(turn).toContainText("passed");
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);

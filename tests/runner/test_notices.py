@@ -12,6 +12,7 @@ from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.notices import KINDS, with_notices
+from action_assistant.runner.queues.entry import QueueReady
 from action_assistant.runner.robots.robot_events import EngineBecame
 from action_assistant.runner.runs.events import (
     AlarmRaised,
@@ -167,6 +168,16 @@ async def test_who_asks_for_a_second_person_is_told_once_in_ten_minutes(journal:
         "Ann asks a second person to say yes to Fetch for David."
     ] * 2
     assert await approvals.given_for("a" * 64) == ()
+
+
+async def test_whose_turn_it_is_in_a_queue_is_told_once_in_ten_minutes(journal: Journal) -> None:
+    for later in (0, 1, 11):
+        at = EPOCH + later * MINUTE
+        ready = QueueReady(at=at, person="Ann", graph="g1", graph_name="Fetch", robots=("David",))
+        await _store(journal, "queue/e1", ready)
+    assert [text for _, text in await _told(journal)] == [
+        "It is the turn of Fetch on David, which Ann has put into the queue."
+    ] * 2
 
 
 async def test_tables_that_are_made_again_send_nothing_again(journal: Journal) -> None:

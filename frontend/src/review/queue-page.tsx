@@ -151,7 +151,10 @@ function Turn({ entry }: { entry: QueueEntry }) {
   const moves = entry.robots.length > 0;
   const begin = () => runner !== undefined && start.mutate(runner);
   return (
-    <section className={style.turn} aria-label={`Before the start of ${entry.graph_name}`}>
+    <section
+      className={style.turn}
+      aria-label={`Before the start of ${isolated(entry.graph_name)}`}
+    >
       {differs.length > 0 && (
         <div className={style.differs}>
           <b>It is not as it was when it was put here:</b>
@@ -198,6 +201,10 @@ function Turn({ entry }: { entry: QueueEntry }) {
 }
 
 function stateWords({ state, waits, by_itself }: QueueEntry): string {
+  if (state === "closed") {
+    const closed = waits.filter(({ why }) => why === "closed");
+    return closed.map(({ robot }) => `The queue of ${robotWords(robot)} is closed.`).join(" ");
+  }
   if (waits.length > 0) return waits.map(({ text }) => text).join(" ");
   if (state === "changed") return "Its turn. Something has changed: look before the start.";
   return by_itself ? "Its turn: it starts by itself." : "Its turn: a person looks, and starts it.";

@@ -84,7 +84,11 @@ export function RobotsPage({ onImport }: Props) {
           <h2 className="page-title">Robots</h2>
           {robots.length > 0 && button}
         </div>
-        {queued > 0 && <Link to="/runs/queue">{counted(queued, "start")} in the queue</Link>}
+        {queued > 0 && (
+          <p>
+            <Link to="/runs/queue">{counted(queued, "start")} in the queue</Link>
+          </p>
+        )}
         {reach?.no_reach && <NoReach why={reach.no_reach} />}
         {!known && (
           <div aria-hidden>

@@ -263,7 +263,7 @@ class History:
                 await self._stop_run(control, queues)
             case "reopen":
                 for lane in queues.lanes:
-                    if lane.closed is not None:
+                    if lane.closed is not None and lane in queues.lanes:
                         with suppress(Refused):
                             await reopened(queues, lane.name)
                             self.reopened.add(id(lane))

@@ -24,8 +24,12 @@ from action_assistant.runner.queues.entry import (
 )
 from action_assistant.runner.queues.lanes import Entry, Lane
 from action_assistant.runner.queues.service import Queues, closing_of
-from action_assistant.runner.robots.rights import Rules
+from action_assistant.runner.queues.views import queue_view
+from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs.events import Requested
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sight import Unseen
+from action_assistant.runner.runs.sight import run_graphs as _of
 from action_assistant.web.auth.identity import Identity
 from runner.execution.test_conductor import led, shared
 from runner.harness import (
@@ -143,6 +147,48 @@ async def test_a_start_waits_for_its_robot_and_then_for_a_person() -> None:
         await started(queues, second, BEN)
         assert queues.entries == ()
         assert len(lab.david.starts) == 3
+
+
+@virtual
+async def test_of_a_graph_out_of_sight_robot_state_and_person_are_shown_and_nothing_else() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        run = await direct(control, "David")
+        await put(queues, on("David", "secret", graph="hidden"))
+
+        def run_of(run: str) -> Run:
+            return control.open[run].run
+
+        unseen = Unseen(BEN.person.id, frozenset({"hidden", "g1"}))
+        for reader in (None, unseen):
+            shown = queue_view(queues, run_of, reader)
+            (entry,) = shown.entries
+            text = msgspec.json.encode(shown).decode()
+            assert (entry.robots, entry.state, entry.author.name) == (("David",), "waiting", "Ann")
+            assert ("secret" in text, entry.digest != "") == (reader is None, reader is None)
+            assert entry.waits[0].run == run
+            assert "by Ben." in entry.waits[0].text
+            assert ("running other" in text) == (
+                reader is None or not reader.hides(_of(run_of(run)))
+            )
+        control.stop_robot("David", author(BEN))
+        text = msgspec.json.encode(queue_view(queues, run_of, unseen)).decode()
+        assert '"closed":{"closing":' in text
+        assert "secret" not in text
+
+
+@virtual
+async def test_nobody_puts_a_start_where_they_may_not_start() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        rules = Rules(operators=(Operator(BEN.person.id, "Ben"),))
+        await control.rights.set_rules("David", rules, OLGA)
+        with pytest.raises(Conflict, match="may not start on David"):
+            await put(queues, on("David"))
+        entry = await put(queues, on("David"), BEN)
+        with pytest.raises(Refused, match="may not start on David"):
+            await started(queues, entry)
+        await started(queues, entry, BEN)
 
 
 @virtual
@@ -356,6 +402,8 @@ async def test_after_a_restart_the_entries_are_there_and_their_queues_are_closed
         with pytest.raises(Conflict, match="started again"):
             await started(queues, queues.entries[0])
         await reopened(queues, "David")
+        await until(lambda: bool(queues.entries[0].differs))
+        assert "started again" in queues.entries[0].differs[0]
         await over(control, await started(queues, queues.entries[0]))
         assert len(lab.david.starts) == 1
 

@@ -10,6 +10,7 @@ import { useLive } from "../../api/page-link";
 import { enterQueue } from "../../api/queue";
 import type { Preflight } from "../../api/robots";
 import { newAid } from "../../graph/document-keys";
+import style from "./start-dialog.module.css";
 import { checkedVersion, notifyFailure, type StartInput } from "./use-start";
 
 /** Items in the way that waiting, or the person at the start itself, may mend. */
@@ -65,14 +66,19 @@ interface Props {
 export function QueueButton({ graph, wanted, onEntered }: Props) {
   const enter = useEnterQueue(graph);
   return (
-    <Button
-      variant="default"
-      loading={enter.isPending}
-      leftSection={<IconHourglassEmpty size={14} aria-hidden />}
-      title="It waits until the robot is free. Nothing starts by itself: you look, and start it then."
-      onClick={() => enter.mutate(wanted, { onSuccess: onEntered })}
-    >
-      Wait in the queue
-    </Button>
+    <section className={style.second} aria-label="Wait">
+      <Button
+        size="compact-sm"
+        variant="default"
+        loading={enter.isPending}
+        leftSection={<IconHourglassEmpty size={14} aria-hidden />}
+        onClick={() => enter.mutate(wanted, { onSuccess: onEntered })}
+      >
+        Wait in the queue
+      </Button>{" "}
+      <span className="quiet-12">
+        Nothing starts by itself: at its turn you look, and start it.
+      </span>
+    </section>
   );
 }

@@ -573,6 +573,7 @@ export function StartDialog(props: Props) {
           onChange={(event) => setReason(event.currentTarget.value)}
         />
       )}
+      {waits && <QueueButton graph={graph} wanted={{ ...sent, ...override }} onEntered={onClose} />}
       <footer className={style.foot}>
         <Exactly
           name={name}
@@ -582,9 +583,6 @@ export function StartDialog(props: Props) {
           moves={led && way.missing === null ? movesWords(castFor(cast, moving)) : ""}
           values={values}
         />
-        {waits && (
-          <QueueButton graph={graph} wanted={{ ...sent, ...override }} onEntered={onClose} />
-        )}
         <StartButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
           label={why ?? (moves && !repeat ? "Hold to start" : what)}

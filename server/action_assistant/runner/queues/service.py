@@ -394,7 +394,9 @@ class Queues:
         by = entry.by
         identity = None if by is None else self._control.rights.current(by[1])
         try:
-            if by is None or identity is None:
+            if by is None:
+                raise Conflict("The runner was started again since it was put into the queue.")
+            if identity is None:
                 raise Forbidden(f"{entered.author.name or 'Its person'} is not signed in any more.")
             start = await self._start_in(entry, {})
             look, _ = await self._look(start, entered.seen, identity)
@@ -601,9 +603,10 @@ class Queues:
         for id_ in filter(None, (run.id, run.group) if run.robots else ()):
             known = self._robots_of.get(id_) or frozenset()
             self._robots_of.put(id_, known.union(run.robots))
-        entry = next((e for e in self._entries if request_of(e.id) == run.request_id), None)
-        if entry is not None:
-            self._leave(entry, run)
+        for entry in self._entries if run.request_id.startswith(stream_of("")) else ():
+            if request_of(entry.id) == run.request_id:
+                self._leave(entry, run)
+                break
         self._doubts.look_at(run)
         if is_news:
             self._survey()
