@@ -1,5 +1,5 @@
 /** How much code each page loads before it can be used, by the build of `npm run build` in `dist`. */
-import { readFileSync } from "node:fs";
+import { readdirSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { gzipSync } from "node:zlib";
 import { expect, test } from "vitest";
@@ -54,14 +54,14 @@ const PAGE = "src/app/main.tsx";
  */
 const BUDGETS: readonly (readonly [page: string, most: number, entries: readonly string[]])[] = [
   ["STOP alone", 85, []],
-  ["the list of graphs", 173, [PAGE, "home"]],
-  ["the editor", 364, [PAGE, "editor"]],
+  ["the list of graphs", 178, [PAGE, "home"]],
+  ["the editor", 333, [PAGE, "editor"]],
   ["administration", 166, [PAGE, "src/administration/administration-page.tsx"]],
   ["robots", 236, [PAGE, "src/robots/robots-page.tsx"]],
 ];
 
 test.each(BUDGETS)("%s needs at most %i kB of JavaScript", (_, most, entries) => {
-  const chunks = needed(built(), "index.html", ...entries);
+  const chunks = needed(built(), "stop", ...entries);
   const sizes = chunks.map((chunk) => [Math.round(sizeOf(chunk) * 10) / 10, chunk.file] as const);
   const sum = sizes.reduce((all, [size]) => all + size, 0);
   const largest = sizes.sort(([a], [b]) => b - a).map(([size, file]) => `${size} ${file}`);
@@ -69,10 +69,35 @@ test.each(BUDGETS)("%s needs at most %i kB of JavaScript", (_, most, entries) =>
 });
 
 test("STOP needs React and its own file, so that no other part can fail to come and take it away", () => {
-  const names = needed(built(), "index.html").map(({ file }) => file.replace(/-[\w-]{8}\.js$/, ""));
+  const files = needed(built(), "stop").map(({ file }) => file);
+  const names = files.map((file) => file.replace(/-[\w-]{8}\.js$/, ""));
   expect(names.sort()).toEqual(
-    ["index", "react", "rolldown-runtime", "stop"].map((name) => `assets/${name}`),
+    ["react", "rolldown-runtime", "stop"].map((name) => `assets/${name}`),
   );
+  const scripts = readFileSync(resolve(DIST, "index.html"), "utf8").matchAll(
+    /<script[^>]+src="\.\/([^"]+)"/g,
+  );
+  const [page, ...others] = [...scripts].map(([, file]) => file).reverse();
+  expect(page).toMatch(/^assets\/page-/);
+  expect(others.sort()).toEqual(files.sort());
+});
+
+test("the page has the styles of each component of Mantine in it, and no others", () => {
+  const styles = resolve(import.meta.dirname, "../node_modules/@mantine/core/styles");
+  const own = /m_[0-9a-f]{6,8}/g;
+  const all = (suffix: string) =>
+    readdirSync(resolve(DIST, "assets"))
+      .filter((name) => name.endsWith(suffix))
+      .map((name) => readFileSync(resolve(DIST, "assets", name), "utf8"))
+      .join();
+  const used = new Set(all(".js").match(own));
+  const there = new Set(all(".css").match(own));
+  const files = readdirSync(styles).filter((name) => name.endsWith(".layer.css"));
+  const wrong = files.filter((name) => {
+    const classes = readFileSync(resolve(styles, name), "utf8").match(own) ?? [];
+    return classes.some((each) => used.has(each)) !== classes.some((each) => there.has(each));
+  });
+  expect(wrong).toEqual([]);
 });
 
 test("what is heavy and seldom used is loaded by nobody who has not asked for it", () => {
@@ -80,9 +105,7 @@ test("what is heavy and seldom used is loaded by nobody who has not asked for it
   const pages = Object.keys(manifest).filter((key) =>
     /^src\/(app\/.*screens?|(administration|robots)\/.*-page)\.tsx$/.test(key),
   );
-  const loaded = needed(manifest, "index.html", PAGE, "home", "editor", ...pages).map(
-    ({ file }) => file,
-  );
+  const loaded = needed(manifest, "stop", PAGE, "home", "editor", ...pages).map(({ file }) => file);
   expect(pages.length).toBeGreaterThan(3);
   const heavy = /json-editor|start-dialog|share-dialog|elk/;
   expect(loaded.filter((file) => heavy.test(file))).toEqual([]);

@@ -1,6 +1,7 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
+import { afterFirstView } from "../clock/first-view";
 import { editor, runnerAt } from "./client";
 import { fetchAnswer, fetchText } from "./http";
 import type { EditorApi } from "./schema/editor";
@@ -49,8 +50,11 @@ export function useVersions(graph: string, wanted: string | null = null) {
   const versions = useQuery({
     enabled: graph !== "",
     queryKey: queryKeys.versions(graph),
-    queryFn: ({ signal }) =>
-      editor.get("/api/graphs/{graph_id}/versions", { path: inGraph(graph), signal }),
+    queryFn: async ({ signal }) => {
+      await afterFirstView(signal);
+      return editor.get("/api/graphs/{graph_id}/versions", { path: inGraph(graph), signal });
+    },
+    staleTime: 2_000, // parts of one screen ask one after the other
   });
   const missing =
     wanted !== null && versions.data?.every((version) => version.id !== wanted) === true;
@@ -64,12 +68,11 @@ export function useVersions(graph: string, wanted: string | null = null) {
 export function useProblems(graph: string, seq: number) {
   return useQuery({
     queryKey: queryKeys.problems(graph, seq),
-    queryFn: ({ signal }) =>
-      editor.get("/api/graphs/{graph_id}/problems", {
-        path: inGraph(graph),
-        query: { seq },
-        signal,
-      }),
+    queryFn: async ({ signal }) => {
+      await afterFirstView(signal);
+      const request = { path: inGraph(graph), query: { seq }, signal };
+      return editor.get("/api/graphs/{graph_id}/problems", request);
+    },
     enabled: seq > 0,
     placeholderData: (before) => before,
     staleTime: Number.POSITIVE_INFINITY,

@@ -1,5 +1,6 @@
 /** The library of actions, each a document of its own, as the editor answers it. */
 import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
+import { afterFirstView } from "../clock/first-view";
 import { editor } from "./client";
 import { type GraphDifference, type GraphSummary, type Preview, queryKeys } from "./graphs";
 import { serverPath } from "./page-url";
@@ -32,7 +33,7 @@ const ASKED = 10_000;
 export function useLibrary() {
   return useQuery({
     queryKey: queryKeys.actions,
-    queryFn: ({ signal }) => fetchLibrary(signal),
+    queryFn: ({ signal }) => afterFirstView(signal).then(() => fetchLibrary(signal)),
     refetchInterval: 15_000,
     staleTime: ASKED,
   });
@@ -56,7 +57,8 @@ export type GraphAsAction = EditorApi["GraphAsAction"];
 export function useGraphsAsActions() {
   return useQuery({
     queryKey: [...queryKeys.actions, "graphs"],
-    queryFn: ({ signal }) => editor.get("/api/actions/graphs", { signal }),
+    queryFn: ({ signal }) =>
+      afterFirstView(signal).then(() => editor.get("/api/actions/graphs", { signal })),
     refetchInterval: 30_000,
     staleTime: ASKED,
   });

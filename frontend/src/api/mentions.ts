@@ -1,6 +1,7 @@
 /** The inbox of the signed-in person, and the people whom a comment can mention. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useMemo } from "react";
+import { afterFirstView } from "../clock/first-view";
 import { editor, renewing } from "./client";
 import { useKnownPeople, usePerson } from "./people";
 import type { EditorApi } from "./schema/editor";
@@ -18,7 +19,8 @@ export function useInbox() {
   const { person } = usePerson();
   return useQuery({
     queryKey: mentionsOf(person),
-    queryFn: ({ signal }) => editor.get("/api/mentions", { signal }),
+    queryFn: ({ signal }) =>
+      afterFirstView(signal).then(() => editor.get("/api/mentions", { signal })),
     refetchInterval: LOOK,
     staleTime: LOOK / 2,
     refetchIntervalInBackground: true,

@@ -1,6 +1,7 @@
 /** The colours of people: the server assigns one that nobody else here has. */
 import { useQuery } from "@tanstack/react-query";
 import { createContext, use, useCallback, useEffect } from "react";
+import { afterFirstView } from "../clock/first-view";
 import { isolated } from "../words/isolated";
 import { editor } from "./client";
 import type { EditorApi } from "./schema/editor";
@@ -44,7 +45,8 @@ const NO_IDS: readonly string[] = [];
 export function useKnownPeople(ids: readonly string[]): readonly KnownPerson[] {
   const { data = NOBODY, refetch } = useQuery({
     queryKey: ["people"],
-    queryFn: ({ signal }) => editor.get("/api/people", { signal }),
+    queryFn: ({ signal }) =>
+      afterFirstView(signal).then(() => editor.get("/api/people", { signal })),
     staleTime: 60_000,
   });
   const unknown = ids.filter((id) => !data.some((person) => person.id === id)).join(" ");

@@ -13,7 +13,7 @@ import { UnansweredStartNotice } from "../runs/start/unanswered-starts";
 import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";
 import { useFrontDialog } from "../ui/front-dialog";
-import { lazyPart, OverlayBoundary, PartBoundary } from "../ui/lazy-part";
+import { AfterFirstView, lazyPart, OverlayBoundary, PartBoundary } from "../ui/lazy-part";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
 import { useWatched } from "../ui/watched";
@@ -187,7 +187,9 @@ export function App() {
   return (
     <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
       <OverlayBoundary>
-        <Messages />
+        <AfterFirstView>
+          <Messages />
+        </AfterFirstView>
       </OverlayBoundary>
       <QueryClientProvider client={client}>
         <Router base={basePath}>
@@ -202,7 +204,9 @@ export function App() {
               <NewVersionNotice />
               <LiveRegion />
               <OverlayBoundary>
-                <Notifier />
+                <AfterFirstView>
+                  <Notifier />
+                </AfterFirstView>
               </OverlayBoundary>
             </DropFiles>
           </SignInGate>

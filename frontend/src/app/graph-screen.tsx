@@ -230,7 +230,10 @@ function Inside({ id }: { id: string }) {
 }
 
 function Corner(props: Pick<ComponentProps<typeof ConnectionStatus>, "run" | "whose">) {
-  const alone = useLinkPart((link) => link.state !== "live");
+  // Before its first answer nobody can say that the editor gives none.
+  const alone = useLinkPart(
+    ({ state, seq }) => state !== "live" && !(state === "connecting" && seq === 0),
+  );
   return <ConnectionStatus {...props} alone={alone} />;
 }
 

@@ -1,10 +1,11 @@
 /** Entry of the page around STOP, which has its own (`stop-main.ts`). */
 import "@fontsource-variable/inter/index.css";
-import "@fontsource-variable/jetbrains-mono/index.css";
-import "@mantine/core/styles.css";
-import "@mantine/notifications/styles.css";
+import "../ui/mantine.css";
 import "../ui/base.css";
 import "../ui/utilities.css";
+// Of parts that both the home page and the editor begin with: two stylesheets less.
+import "../status/state-label.module.css";
+import "../ui/segments.module.css";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { errorText } from "../api/http";

@@ -1,6 +1,7 @@
 /** Screens whose code is loaded when they are opened, the one at hand first and others when idle. */
 import type { ReactNode } from "react";
 import { basePath } from "../api/page-url";
+import { expectFirstView, onFirstView } from "../clock/first-view";
 import { type LazyPart, lazyPart, PartBoundary, preloadParts, whenIdle } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
 import { useNewGraphs } from "./imports/new-graphs";
@@ -52,12 +53,14 @@ const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "pr
 export function preloadAt(path: string): Promise<void> {
   const below = path.startsWith(basePath) ? path.slice(basePath.length) : path;
   const [, part] = PLACES.find(([start]) => below.startsWith(start)) ?? ["", HomeScreen];
+  if (part === GraphScreen) expectFirstView();
   return part.preload();
 }
 
 /** Loads the other screens one by one while the browser is idle; not where data is to be saved. */
 export async function preloadWhenIdle(): Promise<void> {
   const { connection } = navigator as { connection?: { saveData?: boolean } };
+  await new Promise<void>((resolve) => onFirstView(resolve));
   if (!connection?.saveData) await preloadParts(idle);
 }
 

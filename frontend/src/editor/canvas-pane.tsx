@@ -8,6 +8,7 @@ import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import { useSearch } from "wouter";
 import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
+import { firstViewIsThere } from "../clock/first-view";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import {
   asksForHistory,
@@ -29,7 +30,7 @@ import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
 import { focusField } from "../ui/focus-field";
 import { useHasFingersOnly } from "../ui/hooks";
-import { boundedPart } from "../ui/lazy-part";
+import { AfterFirstView, boundedPart } from "../ui/lazy-part";
 import { useWatched } from "../ui/watched";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
@@ -189,11 +190,14 @@ function PaneInFlow(props: Props) {
     followed.end();
   };
   useDryRunInView(context);
+  useFirstViewEnd(!waiting);
   useGraphLink(context, begun);
 
   return (
     <div className="column">
-      <DraftBar id={context.id} />
+      <AfterFirstView>
+        <DraftBar id={context.id} />
+      </AfterFirstView>
       <div className={style.sides} data-side={side !== null || undefined}>
         {side && <side.Canvas {...{ side, flow, onPanned: endFollowing }} />}
         <div
@@ -265,6 +269,23 @@ function PlaybackBar({ context, record, past }: PlaybackBarProps) {
       onSide={past.setSide}
     />
   );
+}
+
+/**
+ * Lets the rest of the page come once the cards are on screen, or cannot come now. `drawn`: they are in the document.
+ */
+function useFirstViewEnd(drawn: boolean): void {
+  const fails = useLinkPart(({ state }) => state === "offline" || state === "refused");
+  useEffect(() => {
+    if (fails) firstViewIsThere();
+  }, [fails]);
+  useEffect(() => {
+    if (!drawn) return;
+    let frame = requestAnimationFrame(() => {
+      frame = requestAnimationFrame(firstViewIsThere);
+    });
+    return () => cancelAnimationFrame(frame);
+  }, [drawn]);
 }
 
 /** Brings an action into view when it starts in a dry-run. */

@@ -12,6 +12,7 @@ import {
   useRef,
   useState,
 } from "react";
+import { useFirstView } from "../clock/first-view";
 import { Empty } from "./empty";
 import style from "./lazy-part.module.css";
 
@@ -171,10 +172,11 @@ export function OpeningBoundary({ button, children }: { button: ReactNode; child
 
 const LATER_WITHIN = 1_000; // ms after the first drawing
 
-/** Calls `work` once the page rests after what comes first is drawn. `drawn`: it is. */
+/** Calls `work` once the page rests after the first view and what comes first here. `drawn`: the latter is drawn. */
 export function useOnceIdle(drawn: boolean, work: () => void): void {
   const now = useRef(work);
-  useEffect(() => (drawn ? whenIdle(() => now.current(), LATER_WITHIN) : undefined), [drawn]);
+  const isTime = useFirstView() && drawn;
+  useEffect(() => (isTime ? whenIdle(() => now.current(), LATER_WITHIN) : undefined), [isTime]);
 }
 
 /** Draws its children, whose code is loaded then, after what comes first, once the page rests. */
@@ -182,6 +184,11 @@ export function Later(props: { drawn: boolean; children: ReactNode }): ReactNode
   const [isTime, setTime] = useState(false);
   useOnceIdle(props.drawn, () => setTime(true));
   return isTime && props.children;
+}
+
+/** Draws its children, whose code is loaded then, once the first view is on screen. */
+export function AfterFirstView({ children }: { children: ReactNode }): ReactNode {
+  return useFirstView() && children;
 }
 
 const SOON = 500; // ms, in Safari, which does not say when that is

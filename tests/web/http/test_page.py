@@ -1,6 +1,7 @@
 """The files of the page: what browsers are told of them, and where they say they lie."""
 
 import asyncio
+import gzip
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,18 @@ def page(tmp_path: Path) -> Page:
 
 def asked(page: Page, path: str) -> tuple[int, dict[str, str], str]:
     """Status, headers and body."""
+    status, headers, body = _sent(page, path, [])
+    return status, headers, body.decode()
+
+
+def answered(page: Page, path: str, accepted: str) -> tuple[dict[str, str], bytes]:
+    """Headers and body for a browser that accepts these encodings."""
+    return _sent(page, path, [(b"accept-encoding", accepted.encode())])[1:]
+
+
+def _sent(
+    page: Page, path: str, asking: list[tuple[bytes, bytes]]
+) -> tuple[int, dict[str, str], bytes]:
     told: list[Any] = []
 
     async def receive() -> Any:
@@ -39,10 +52,10 @@ def asked(page: Page, path: str) -> tuple[int, dict[str, str], str]:
     async def send(message: Any) -> None:
         told.append(message)
 
-    scope: Any = {"type": "http", "method": "GET", "path": path, "headers": []}
+    scope: Any = {"type": "http", "method": "GET", "path": path, "headers": asking}
     asyncio.run(page(scope, receive, send))
     headers = {key.decode(): value.decode() for key, value in told[0]["headers"]}
-    return told[0]["status"], headers, told[1]["body"].decode()
+    return told[0]["status"], headers, told[1]["body"]
 
 
 def test_the_page_can_be_installed_below_a_path_of_a_proxy(page: Page) -> None:
@@ -62,3 +75,33 @@ def test_a_browser_asks_each_time_whether_the_worker_is_another(page: Page) -> N
 def test_the_manifest_of_the_build_is_not_served(page: Page) -> None:
     assert not page.knows("/.vite/manifest.json", accepts_html=False)
     assert asked(page, "/.vite/manifest.json")[0] == 404
+
+
+@pytest.mark.parametrize(
+    ("accepted", "encoding"),
+    [
+        ("gzip, deflate, br, zstd", "br"),
+        ("br;q=0, gzip", "gzip"),
+        ("gzip", "gzip"),
+        ("br ; q=0.000", ""),
+        ("brotli, x-gzip", ""),
+        ("", ""),
+    ],
+)
+def test_a_script_is_sent_in_the_shortest_form_that_the_browser_reads(
+    tmp_path: Path, accepted: str, encoding: str
+) -> None:
+    script = b"let a = 1;" * 200
+    bodies = {"br": b"compressed by the build", "gzip": gzip.compress(script, mtime=0), "": script}
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "assets" / "index-abc.js").write_bytes(script)
+    (tmp_path / "assets" / "index-abc.js.br").write_bytes(bodies["br"])
+    (tmp_path / "index.html").write_text("<p>")
+    page = Page(_nobody, tmp_path)
+    headers, body = answered(page, "/assets/index-abc.js", accepted)
+    assert headers.get("content-encoding", "") == encoding
+    assert body == bodies[encoding]
+    assert headers["content-length"] == str(len(body))
+    assert headers["vary"] == "accept-encoding"
+    assert "immutable" in headers["cache-control"]
+    assert not page.knows("/assets/index-abc.js.br", accepts_html=False)

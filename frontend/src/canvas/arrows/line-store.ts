@@ -1,6 +1,7 @@
 /** The lines of one canvas: simple ones at once, routed ones when a worker has computed them. */
 
 import { createContext, useCallback, useContext, useSyncExternalStore } from "react";
+import { onFirstView } from "../../clock/first-view";
 import { tick } from "../../clock/server-clock";
 import type { Position, Precondition } from "../../graph/model";
 import type { Bundle } from "./bundles";
@@ -29,6 +30,8 @@ export class LineStore {
   private dragged: { id: string; waypoints: readonly Point[]; settled: boolean } | null = null;
   private opened: string | null = null;
   private worker: Worker | null = null;
+  /** Calls off the start of the worker, which waits for the first view. */
+  private callOff = () => {};
   private busy = false;
   private waiting: Scene | null = null;
   /** The time until which lines are not updated again, and the timer that updates them then. */
@@ -130,6 +133,7 @@ export class LineStore {
     clearTimeout(this.resting);
     this.resting = undefined;
     this.restsUntil = 0;
+    this.callOff();
     this.worker?.terminate();
     this.worker = null;
     this.busy = false;
@@ -162,9 +166,16 @@ export class LineStore {
       this.waiting = scene;
       return;
     }
-    this.worker ??= this.begin();
     this.busy = true;
-    this.worker.postMessage(scene);
+    if (this.worker !== null) {
+      this.worker.postMessage(scene);
+      return;
+    }
+    const post = () => {
+      this.worker = this.begin();
+      this.worker.postMessage(scene);
+    };
+    this.callOff = onFirstView(post);
   }
 
   private begin(): Worker {

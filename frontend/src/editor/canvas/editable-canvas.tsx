@@ -33,7 +33,7 @@ import { Cursors } from "../../people/cursors";
 import { PeopleAtCards } from "../../people/people";
 import { useRoom } from "../../sync/use-room";
 import { useStableCallback } from "../../ui/hooks";
-import { boundedPart } from "../../ui/lazy-part";
+import { AfterFirstView, boundedPart } from "../../ui/lazy-part";
 import { isolated } from "../../words/isolated";
 import style from "./editable-canvas.module.css";
 import { arrowAt } from "./hit-test";
@@ -279,7 +279,11 @@ function Drawing({
           />
         </>
       )}
-      {map && <GraphMap nodes={canvas.nodes} flow={canvas.flow} />}
+      {map && (
+        <AfterFirstView>
+          <GraphMap nodes={canvas.nodes} flow={canvas.flow} />
+        </AfterFirstView>
+      )}
     </ReactFlow>
   );
 }

@@ -8,13 +8,14 @@ import {
 } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef, useState } from "react";
 import { actionDrag } from "../../canvas/action-drag";
+import { useFirstView } from "../../clock/first-view";
 import { dryRun } from "../../edit-actions/dry-run-actions";
 import { isEnabled } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ProblemGroup } from "../../graph/problems/problem-groups";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks";
-import { boundedPart } from "../../ui/lazy-part";
+import { AfterFirstView, boundedPart } from "../../ui/lazy-part";
 import { Segments } from "../../ui/segments";
 import { Tooltip } from "../../ui/tooltip";
 import { useWatched } from "../../ui/watched";
@@ -201,11 +202,15 @@ function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
   );
 }
 
-/** Return true from the first time on that a panel is open: its contents are loaded then, and stay. */
+/**
+ * Return true from the first time on that a panel is open: its contents are loaded then, and stay. One that is open
+ * from the beginning is filled after the first view.
+ */
 function useOpened(open: boolean): boolean {
+  const isFirstView = useFirstView();
   const [opened, setOpened] = useState(open);
   if (open && !opened) setOpened(true);
-  return open || opened;
+  return opened && isFirstView;
 }
 
 /** Shows the lists beside the canvas, or over it on a narrow screen or beside a rail. */
@@ -217,7 +222,11 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
   const opened = useOpened(beside || left);
   return (
     <>
-      {wide && folded && <ListRail panels={panels} told={told} />}
+      {wide && folded && (
+        <AfterFirstView>
+          <ListRail panels={panels} told={told} />
+        </AfterFirstView>
+      )}
       <aside
         className={style.left}
         // A drawer that closes covers nothing any more.

@@ -7,9 +7,10 @@ import asyncio
 import gzip
 import hashlib
 import mimetypes
+import re
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from anyio import to_thread
@@ -20,6 +21,10 @@ _COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webma
 _TEXTS: Final = frozenset({".html", ".js", ".css"})
 _WORTH: Final = 1000  # bytes
 _MEDIA: Final = {**mimetypes.types_map, ".webmanifest": "application/manifest+json"}
+
+_REFUSED: Final = re.compile(rb"q=0(\.0*)?")
+#: The suffix of copies that the build of the page has compressed.
+_BROTLI: Final = ".br"
 
 Fields = tuple[tuple[bytes, bytes], ...]
 
@@ -45,16 +50,26 @@ _MISSING: Final = "There is no such page."
 
 class File:
     """One file as it is sent. `lasting`: its name contains a hash of its content, so it never
-    changes."""
+    changes. `brotli`: the copy that the build has compressed; empty without one."""
 
-    def __init__(self, body: bytes, suffix: str, *, lasting: bool) -> None:
+    def __init__(self, body: bytes, suffix: str, *, lasting: bool, brotli: bytes = b"") -> None:
         media = _MEDIA.get(suffix, "application/octet-stream")
         self.media: Final = f"{media}; charset=utf-8" if suffix in _TEXTS else media
         self.body: Final = body
         self.etag: Final = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
         self.lasting: Final = lasting
+        self.brotli: Final = brotli
         pays = suffix in _COMPRESSED and len(body) > _WORTH
         self._zipped: bytes | None = None if pays else b""
+
+    async def encoded(self, accepted: bytes) -> tuple[bytes, bytes]:
+        """Return the name of a content encoding and the body in it, chosen among those of an
+        Accept-Encoding header. Both are empty if the body is sent as it is."""
+        if self.brotli and accepts(accepted, b"br"):
+            return b"br", self.brotli
+        if accepts(accepted, b"gzip") and (zipped := await self.zipped()):
+            return b"gzip", zipped
+        return b"", b""
 
     async def zipped(self) -> bytes:
         """Return the gzip-compressed body; empty if compression saves nothing. It is compressed at
@@ -63,6 +78,15 @@ class File:
         if self._zipped is None:
             self._zipped = await to_thread.run_sync(partial(gzip.compress, self.body, mtime=0))
         return self._zipped
+
+
+def accepts(header: bytes, encoding: bytes) -> bool:
+    """Return whether an Accept-Encoding header names a content encoding, and not with q=0."""
+    for each in header.lower().split(b","):
+        name, _, weight = each.partition(b";")
+        if name.strip() == encoding:
+            return not _REFUSED.fullmatch(weight.strip())
+    return False
 
 
 async def send_file(
@@ -82,9 +106,10 @@ async def send_file(
         body, status = b"", 304
     else:
         fields.append((b"content-type", file.media.encode()))
-        if b"gzip" in asked.get(b"accept-encoding", b"") and (zipped := await file.zipped()):
-            body = zipped
-            fields.append((b"content-encoding", b"gzip"))
+        encoding, encoded = await file.encoded(asked.get(b"accept-encoding", b""))
+        if encoding:
+            body = encoded
+            fields.append((b"content-encoding", encoding))
         fields.append((b"content-length", str(len(body)).encode()))
     start: Any = {"type": "http.response.start", "status": status, "headers": fields}
     sent = b"" if scope["method"] == "HEAD" else body
@@ -155,12 +180,20 @@ class Page:
 
 
 def _load(folder: Path) -> dict[str, File]:
-    return {
-        f"/{path.relative_to(folder).as_posix()}": File(
-            path.read_bytes(), path.suffix, lasting="assets" in path.parts
-        )
+    read = {
+        f"/{path.relative_to(folder).as_posix()}": path.read_bytes()
         for path in folder.rglob("*")
         if path.is_file() and not path.relative_to(folder).parts[0].startswith(".")
+    }
+    return {
+        name: File(
+            body,
+            PurePosixPath(name).suffix,
+            lasting="/assets/" in name,
+            brotli=read.get(name + _BROTLI, b""),
+        )
+        for name, body in read.items()
+        if not name.endswith(_BROTLI)
     }
 
 
