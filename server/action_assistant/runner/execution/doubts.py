@@ -10,7 +10,7 @@ from action_assistant.runner.runs.author import Author
 from action_assistant.runner.runs.doubts import Doubt, doubts_in
 from action_assistant.runner.runs.run import Run
 
-_SEEN: Final = 2000  # facts about runs, each of which counts once
+_SEEN: Final = 2000  # runs whose doubts are remembered: each counts once while it lasts
 
 
 class Closable:
@@ -49,15 +49,19 @@ class DoubtWatch(Generic[C]):
         self._control = control
         self._closables = closables
         self._close = close
-        self._seen: LruCache[str, bool] = LruCache(_SEEN)
+        self._seen: LruCache[str, frozenset[tuple[str, int | None]]] = LruCache(_SEEN)
         control.watch_robots(self._robots_changed)
         control.watch_stops(self._stopped)
+
+    def standing(self, closable: C) -> tuple[dict[str, str], dict[str, str]]:
+        """Return the engine's process, and the holder of the baton, of each of its robots now."""
+        names = closable.robots
+        return {n: self._life(n) for n in names}, {n: self._holder(n) for n in names}
 
     def begin(self, closable: C) -> None:
         """Let it be open from now on, and remember how its robots are."""
         closable.is_open = True
-        closable.lives = {name: self._life(name) for name in closable.robots}
-        closable.holders = {name: self._holder(name) for name in closable.robots}
+        closable.lives, closable.holders = self.standing(closable)
 
     def meet(self, closable: C, doubt: Doubt) -> None:
         """Note a doubt about one of them."""
@@ -67,11 +71,10 @@ class DoubtWatch(Generic[C]):
 
     def look_at(self, run: Run) -> None:
         """Close whatever a change of a run concerns."""
-        for doubt in doubts_in(run):
-            key = f"{run.id} {doubt.why}"
-            if self._seen.get(key):
-                continue
-            self._seen.put(key, True)
+        doubts = {(each.why, run.moves_again_at): each for each in doubts_in(run)}
+        known = self._seen.get(run.id) or frozenset()
+        self._seen.put(run.id, frozenset(doubts))
+        for doubt in [each for key, each in doubts.items() if key not in known]:
             for each in tuple(self._closables()):
                 if each.owns(run.id) or not set(run.robots).isdisjoint(each.robots):
                     self.meet(each, doubt)

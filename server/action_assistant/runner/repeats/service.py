@@ -273,19 +273,23 @@ class Repeats:
         if cell is None:
             raise Conflict("Every run of this repeat was started.")
         self._require_at_rest(record)
+        standing = self._doubts.standing(record)
         request = _start_of(record, cell, asked.watching)
         await self._require_clear(request, identity)
+        is_stored = False
         with anyio.move_on_after(_WAIT_S):
             async with record.storing:
-                if record.has_changed(before):
+                if record.has_changed(before) or self._doubts.standing(record) != standing:
                     raise Conflict("It was opened or closed meanwhile. Look again.")
                 event = RepeatReopened(at=self._clock_us(), author=author)
                 await self._journal.append(stream_of(id_), [draft_of(event, author.id)])
+                is_stored = True
                 self._follow(record, event)
-                if not record.has_changed(before):
+                is_other = self._doubts.standing(record) != standing
+                if not is_other and not record.has_changed(before):
                     self._begin(record, author, identity)
                     return record.repeat
-        if not record.has_changed(before):
+        if not is_stored and not record.has_changed(before):
             raise Unavailable("It could not be stored that the repeat was closed. Try again.")
         reason = Doubt("stop", "Something closed it while it was being opened again.")
         self._close(record, reason, is_stored=True)
