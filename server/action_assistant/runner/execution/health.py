@@ -22,6 +22,7 @@ from action_assistant.runner.runtime import Runtime
 log: Final = logging.getLogger(__name__)
 
 _POLL_S: Final = 1.0
+_PACE_S: Final = 0.2  # between two looks at least
 _SHOWN_S: Final = 5.0  # the age that people see is behind by so much at most
 _AGAIN_S: Final = 5.0
 _NOT_YET: Final = "it is not listened to yet"
@@ -78,6 +79,7 @@ class HealthWatch:
                 has_rules = True
             with anyio.move_on_after(_POLL_S if has_rules else None):
                 await self._news.wait()
+            await anyio.sleep(_PACE_S)  # a robot may change as often as its publisher likes
 
     def _now(self, robot: str, check: HealthCheck) -> HealthNow:
         watched = self._watched.get((robot, check.source))
