@@ -27,7 +27,7 @@ from action_assistant.runner.api.caller import SMALL
 from action_assistant.runner.api.confirmations import routes as device_confirmations
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.api.monitoring import WatchedRunner
-from action_assistant.runner.api.run_guard import is_seen_by_all
+from action_assistant.runner.api.run_guard import is_seen_by_all, is_waiting_seen_by_all
 from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
@@ -196,7 +196,10 @@ def _identity_now(
 
 
 async def _is_seen_by_all(services: RunnerServices, message: Message) -> bool:
-    run, graph = (str(message.facts.get(name, "")) for name in ("run", "id"))
+    run, graph, entry = (str(message.facts.get(name, "")) for name in ("run", "id", "entry"))
+    if entry:
+        waiting = (each.graphs for each in services.queues.entries if each.id == entry)
+        return is_waiting_seen_by_all(services, next(waiting, None))
     return await is_seen_by_all(services, run, graph)
 
 

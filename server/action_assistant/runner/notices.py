@@ -9,6 +9,7 @@ from sqlalchemy import Executable, Select, exists, func, insert, literal, or_, s
 
 from action_assistant.journal.events import Event, Fold
 from action_assistant.runner.queues.entry import QueueReady
+from action_assistant.runner.queues.entry import stream_of as stream_of_entry
 from action_assistant.runner.robots.robot_events import EngineBecame, stream_of_robot
 from action_assistant.runner.runs.events import (
     AlarmRaised,
@@ -101,6 +102,7 @@ def notices(event: Event, receivers: Sequence[Receiver]) -> list[Executable]:
             "graph": ready.graph_name,
             "robot": ", ".join(ready.robots),
             "id": ready.graph or "",
+            "entry": event.stream.removeprefix(stream_of_entry("")),
         }
         return _statements(event, receivers, "queue.ready", ready.at, facts, None)
     if event.kind == EngineBecame.kind:

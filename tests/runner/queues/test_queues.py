@@ -12,6 +12,7 @@ from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Ref
 from action_assistant.runner.api.live import Hub, Outbox, QueueMessage
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.execution.start_checks import StartChecks
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.queues.entry import (
     MOST_OF_ONE,
@@ -20,6 +21,9 @@ from action_assistant.runner.queues.entry import (
     QueueReady,
     QueueRequest,
     TurnRequest,
+    differences,
+    digest_of,
+    looked_of,
     stream_of,
 )
 from action_assistant.runner.queues.lanes import Entry, Lane
@@ -30,7 +34,9 @@ from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sight import Unseen
 from action_assistant.runner.runs.sight import run_graphs as _of
+from action_assistant.runner.start.preflight import Item, Preflight, Verdict
 from action_assistant.web.auth.identity import Identity
+from action_assistant.web.workers.lanes import Crashed
 from runner.execution.test_conductor import led, shared
 from runner.harness import (
     Harness,
@@ -340,6 +346,70 @@ async def test_a_stop_that_comes_while_an_entry_is_being_started_lets_nothing_le
 
 
 @virtual
+async def test_a_start_that_was_pressed_before_a_stop_does_not_leave_when_the_queue_is_open_again() -> (
+    None
+):
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        entry = await put(queues, on("David"))
+        look = await queues.look(entry.id, {}, ANN)
+        found: list[object] = []
+
+        async def press() -> None:
+            try:
+                found.append(
+                    await queues.start(entry.id, TurnRequest(look.digest), author(ANN), ANN)
+                )
+            except Conflict as refused:
+                found.append(refused.detail)
+
+        async with anyio.create_task_group() as people, entry.turn:  # it is being removed, say
+            people.start_soon(press)
+            await anyio.sleep(0.5)
+            control.stop_robot("David", author(BEN))
+            await reopened(queues, "David")
+            assert lane(queues, "David").closed is None
+        assert found == ["Its queue was closed since, or a robot was not free. Look again."]
+        await anyio.sleep(60)
+        assert lab.david.starts == []
+
+
+@virtual
+async def test_what_changes_while_a_queue_is_being_opened_leaves_it_closed() -> None:
+    lab = Lab()
+    async with lab.runner() as (_, queues):
+        await put(queues, on("David"))
+        queues.close("David", author(BEN))
+        lab.harness.journal.slow = 10.0
+        async with anyio.create_task_group() as people:
+
+            async def press() -> None:
+                with pytest.raises(Conflict, match="opened or closed meanwhile"):
+                    await reopened(queues, "David")
+
+            people.start_soon(press)
+            await anyio.sleep(1)
+            lab.david.engine = engine(QUICK)  # its process was started anew
+            await anyio.sleep(5)
+        assert why_closed(queues, "David") == "person"
+
+
+@virtual
+async def test_a_run_that_moves_again_closes_a_queue_each_time() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        run = await direct(control, "David")
+        await over(control, run)
+        await put(queues, on("David"))
+        known = await control.find(run)
+        for at in (1, 2):
+            queues._doubts.look_at(msgspec.structs.replace(known, moves_again_at=at))
+            assert why_closed(queues, "David") == "moves"
+            queues._doubts.look_at(msgspec.structs.replace(known, moves_again_at=at))
+            await reopened(queues, "David")
+
+
+@virtual
 async def test_a_failed_run_a_baton_a_word_of_rest_and_a_person_close_a_queue() -> None:
     lab = Lab()
     async with lab.runner() as (control, queues):
@@ -480,6 +550,59 @@ async def test_at_its_turn_the_runner_looks_and_says_what_differs() -> None:
         await over(control, run)
         await until(lambda: bool(entry.differs))
         assert "The rules of David have changed." in entry.differs
+
+
+def test_one_of_several_checks_of_a_robot_that_is_worse_now_is_said() -> None:
+    def look(*verdicts: Verdict) -> list[Preflight]:
+        items = [Item(code="health", verdict=each, text=f"It is {each}.") for each in verdicts]
+        return [Preflight("David", "", "", tuple(items), (), False)]
+
+    before, now = look("passed", "passed"), look("warned", "passed")
+    seen = looked_of(before, {})
+    assert digest_of(seen) != digest_of(looked_of(now, {}))
+    assert differences(seen, looked_of(now, {}), now) == ("It is warned.",)
+    assert differences(seen, seen, before) == ()
+
+
+@virtual
+async def test_a_worker_that_dies_in_the_look_at_a_turn_ends_nothing_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def dies(*_: object) -> Preflight:
+        raise Crashed("The process that worked on this has died; nothing came of it.")
+
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        run = await direct(control, "David")
+        entry = await put(queues, on("David"))
+        with monkeypatch.context() as broken:
+            broken.setattr(StartChecks, "_look", dies)
+            await over(control, run)
+            await until(lambda: bool(entry.differs))
+        assert entry.differs == ("The process that worked on this has died; nothing came of it.",)
+        await started(queues, entry)
+
+
+@virtual
+async def test_what_is_put_there_again_after_a_failure_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def away(*_: object, **__: object) -> int:
+        raise Unavailable("the disk is away")
+
+    lab = Lab()
+    async with lab.runner() as (_, queues):
+        request = on("David")
+        with monkeypatch.context() as broken:
+            broken.setattr(lab.harness.journal, "append", away)
+            broken.setattr(lab.harness.journal, "newest", away)
+            with pytest.raises(Unavailable):
+                await put(queues, request)
+            await anyio.sleep(0.5)
+        entry = await put(queues, request)
+        await anyio.sleep(60)
+    async with lab.runner() as (_, queues):
+        assert [each.id for each in queues.entries] == [entry.id]
 
 
 @virtual

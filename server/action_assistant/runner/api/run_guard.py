@@ -153,6 +153,13 @@ async def is_seen_by_all(services: RunnerServices, run: str, graph: str) -> bool
     return of is not None and not unseen.hides(of)
 
 
+def is_waiting_seen_by_all(services: RunnerServices, graphs: RunGraphs | None) -> bool:
+    """Return whether everybody may see a start that waits, by its graphs; None for one that has left the
+    queue, which is seen by nobody while there are rules."""
+    unseen = services.sight.unseen(ANYBODY)
+    return unseen is None or (graphs is not None and not unseen.hides(graphs))
+
+
 def shown(
     services: RunnerServices, connection: _Connection, view: _View, graphs: RunGraphs
 ) -> _View:

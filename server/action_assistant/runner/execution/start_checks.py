@@ -470,22 +470,33 @@ class StartChecks:
     async def look(self, group: GroupRequest, starter: Identity) -> list[Preflight]:
         """Return the pre-flight of a start on each engine that `group` names. `starter`: the
         person who would start. A refusal becomes an item of the pre-flight. Nothing is stored,
-        and engines are only asked for their graphs; the call waits for their answers."""
+        and engines are only asked for their graphs; the call waits for their answers. Raise
+        Unavailable if a worker dies."""
         if any(self.leads(engine, group.robots) for engine in group.engines):
             return await self._look_conducted(group.for_engine(CONDUCTED), starter)
         found: dict[str, Preflight] = {}
         courses: list[Item] = []
 
+        refused: list[Refused] = []
+
         async def look(engine: str) -> None:
-            found[engine] = await self._look(group.for_engine(engine), starter)
+            try:
+                found[engine] = await self._look(group.for_engine(engine), starter)
+            except Refused as error:  # such as a worker that has died; a task group would wrap it
+                refused.append(error)
 
         async def check_courses() -> None:
-            courses.extend(await self._course_items(group, starter))
+            try:
+                courses.extend(await self._course_items(group, starter))
+            except Refused as error:
+                refused.append(error)
 
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(check_courses)
             for engine in group.engines:
                 tasks.start_soon(look, engine)
+        if refused:
+            raise refused[0]
         looks = [preflight.with_items(found[engine], courses) for engine in group.engines]
         return await self._approved(looks, group.for_engine(group.engines[0]), starter)
 

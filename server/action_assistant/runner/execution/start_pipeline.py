@@ -10,7 +10,7 @@ Each stage takes the values of the stages before it and returns the next one:
     store            AcceptedStart           Run: `run.requested.v1` is in the journal
     hand over        Run, Order              OpenRun, which sends one start message
 
-A start happens at most once: it is never retried and never queued. A refusal before `store` leaves
+A start happens at most once and is never retried: what waits in a queue comes here by a press of its own. A refusal before `store` leaves
 nothing behind, and a start that cannot be stored is not sent.
 """
 

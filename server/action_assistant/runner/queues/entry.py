@@ -5,7 +5,8 @@ Its stream `queue/ID` says who put it there, what was looked at, and how it left
 """
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 import msgspec
@@ -227,13 +228,21 @@ def require_queueable(request: QueueRequest) -> None:
 def looked_of(looks: Sequence[Preflight], rules: Mapping[str, Rules]) -> Looked:
     """Return what has to stay as it is of a pre-flight. `rules`: of each robot of the start."""
     items: dict[str, dict[str, str]] = {
-        each.engine: {
-            item.code: item.verdict for item in each.items if item.code not in _OF_THE_MOMENT
-        }
-        for each in looks
+        each.engine: {name: item.verdict for name, item in _counted(each)} for each in looks
     }
     words = {name: msgspec.json.encode(each).decode() for name, each in rules.items()}
     return Looked(items, words, next((each.tree_digest for each in looks if each.tree_digest), ""))
+
+
+def _counted(look: Preflight) -> Iterator[tuple[str, Item]]:
+    """Yield the items of a pre-flight that have to stay as they are, each with a name of its own: its
+    code, and a number from the second of that code on."""
+    counts: Counter[str] = Counter()
+    for item in look.items:
+        if item.code not in _OF_THE_MOMENT:
+            counts[item.code] += 1
+            number = counts[item.code]
+            yield item.code if number == 1 else f"{item.code} {number}", item
 
 
 def digest_of(looked: Looked) -> str:
@@ -253,10 +262,8 @@ def differences(seen: Looked, now: Looked, looks: Sequence[Preflight]) -> tuple[
         found.append("A graph inside of it is another one.")
     for look in looks:
         known = seen.items.get(look.engine, {})
-        for item in look.items:
-            before = known.get(item.code, "passed")
-            is_counted = item.code not in _OF_THE_MOMENT
-            if is_counted and _WORSE[item.verdict] > _WORSE.get(before, 0):
+        for name, item in _counted(look):
+            if _WORSE[item.verdict] > _WORSE.get(known.get(name, "passed"), 0):
                 found.append(item.text)
     return tuple(dict.fromkeys(found))
 

@@ -251,13 +251,17 @@ class Queues:
     async def _disown(self, stream: str) -> None:
         """Store that an entry has left, in case it was committed although the answer got lost."""
         while True:
-            try:
-                if await self._journal.newest(stream):
-                    left = QueueLeft(at=self._clock_us())
-                    await self._journal.append(stream, [draft_of(left)])
-                return
-            except Refused:
-                await anyio.sleep(_STORE_S)
+            async with self._entering:  # it may be sent again, and stored, meanwhile
+                if any(stream_of(each.id) == stream for each in self._entries):
+                    return
+                try:
+                    if await self._journal.newest(stream):
+                        left = QueueLeft(at=self._clock_us())
+                        await self._journal.append(stream, [draft_of(left)])
+                    return
+                except Refused:
+                    pass
+            await anyio.sleep(_STORE_S)
 
     async def _known(self, request: QueueRequest, author: Author) -> Entry | None:
         """Return the entry that a request has become; None if it has become none yet. Raise Conflict if
@@ -317,8 +321,9 @@ class Queues:
         async with entry.turn:
             self.find(id_)
             event = QueueLeft(at=self._clock_us(), by=author)
-            await self._journal.append(stream_of(id_), [draft_of(event, author.id)])
-            self._forget(entry)
+            with anyio.CancelScope(shield=True):
+                await self._journal.append(stream_of(id_), [draft_of(event, author.id)])
+                self._forget(entry)
 
     def _require_own(self, entry: Entry, identity: Identity, what: str) -> None:
         if identity.person.role != OWNER and entry.entered.author.id != identity.person.id:
@@ -359,7 +364,7 @@ class Queues:
                 if not waits:
                     entry.ready_at = was_ready or self._clock_us()
                     if was_ready is None:
-                        self._tasks.start_soon(self._turn_came, entry, entry.ready_at)
+                        self._tasks.start_soon(self._take_turn, entry, entry.ready_at)
         if is_changed:
             self._changed()
 
@@ -375,6 +380,12 @@ class Queues:
             yield Waiting(name, "run", occupying.id)
         elif self._control.foreign_stops.is_stopping(name):
             yield Waiting(name, "stop")
+
+    async def _take_turn(self, entry: Entry, ready_at: int) -> None:
+        try:
+            await self._turn_came(entry, ready_at)
+        except Exception:  # a fault of one entry ends no other part of the runner
+            log.exception("the turn of %s", entry.id)
 
     async def _turn_came(self, entry: Entry, ready_at: int) -> None:
         """Look before the start, tell people, and start an entry that starts by itself."""
@@ -420,7 +431,7 @@ class Queues:
             try:
                 if isinstance(denied, Denied):
                     raise Forbidden(denied.reason)
-                await self._start(entry, start, author, identity)
+                await self._start(entry, start, ready_at, author, identity)
             except Refused as refused:
                 for lane in [self._lanes[name] for name in entry.lanes if name in self._lanes]:
                     self._doubts.meet(lane, Doubt("refused", refused.detail))
@@ -436,10 +447,10 @@ class Queues:
         entry = next((each for each in self._entries if each.id == id_), None)
         if entry is None:
             return await self._started(id_)
+        ready_at = self._require_turn(entry)
         async with entry.turn:
             if entry not in self._entries:
                 return await self._started(id_)
-            self._require_turn(entry)
             start = await self._start_in(entry, asked.watching)
             look, _ = await self._look(start, entry.entered.seen, identity)
             if look.digest != asked.look:
@@ -447,20 +458,22 @@ class Queues:
                 if look.differs:
                     text += f" Since it was put into the queue: {' '.join(look.differs[:3])}"
                 raise Conflict(text, where={"path": "/look", "differs": list(look.differs)})
-            return await self._start(entry, start, author, identity)
+            return await self._start(entry, start, ready_at, author, identity)
 
     async def _start(
-        self, entry: Entry, start: StartRequest, author: Author, identity: Identity
+        self, entry: Entry, start: StartRequest, ready_at: int, author: Author, identity: Identity
     ) -> Started:
-        """Start an entry. Nothing waits between the look at the queue and the start, which takes note
-        of the Stops pressed so far in that same step."""
-        self._require_turn(entry)
+        """Start an entry whose turn came at `ready_at`. Nothing waits between the look at the queue and
+        the start, which takes note of the Stops pressed so far in that same step. Raise Conflict if
+        its queue was closed since then, although it is open again."""
+        if self._require_turn(entry) != ready_at:
+            raise Conflict("Its queue was closed since, or a robot was not free. Look again.")
         started = await self._control.start(start, author, identity)
         self._leave(entry, started.run)
         return started
 
-    def _require_turn(self, entry: Entry) -> None:
-        """Raise Conflict if an entry has to wait."""
+    def _require_turn(self, entry: Entry) -> int:
+        """Return since when it is the turn of an entry, µs UTC. Raise Conflict if it has to wait."""
         self._survey()
         for each in entry.waits:
             closed = self._lanes[each.robot].closed if each.why == "closed" else None
@@ -474,6 +487,8 @@ class Queues:
                 )
             text = named(each.robot)
             raise Conflict(f"{text[0].upper()}{text[1:]} is not free.", where=where)
+        assert entry.ready_at is not None
+        return entry.ready_at
 
     async def _started(self, id_: str) -> Started:
         """Return the run that an entry has become. Raise NotFound if it has become none."""
@@ -557,6 +572,7 @@ class Queues:
             where: dict[str, object] = {"path": "/closing", "closing": closing_of(closed)}
             raise Conflict(f"It was closed again meanwhile. {closed.text}", where=where)
         self._require_settled(robot)
+        standing = self._doubts.standing(lane)
         entry = self._first_seen(lane, identity)
         start = await self._start_in(entry, {})
         look, _ = await self._look(start, entry.entered.seen, identity)
@@ -564,7 +580,8 @@ class Queues:
         event = QueueOpened(at=self._clock_us(), author=author)
         with anyio.CancelScope(shield=True):
             await self._journal.append(stream_of_robot(robot), [draft_of(event, author.id)])
-            if lane.closed is not closed or lane.doubts != before or self._lanes.get(robot) != lane:
+            is_other = lane.doubts != before or self._doubts.standing(lane) != standing
+            if lane.closed is not closed or is_other or self._lanes.get(robot) != lane:
                 if lane.closed is not None:
                     self._tasks.start_soon(self._store, stream_of_robot(robot), lane.closed)
                 raise Conflict("It was opened or closed meanwhile. Look again.")
@@ -632,7 +649,11 @@ class Queues:
                 event = QueueLeft(at=self._clock_us(), run=rows[0].id)
                 self._tasks.start_soon(self._store, stream_of(entry.id), event)
         for row in await self._journal.query(queries.newest_move(QueueMoved.kind)):
-            order = msgspec.json.decode(row.body, type=QueueMoved).order
+            try:
+                order = msgspec.json.decode(row.body, type=QueueMoved).order
+            except msgspec.DecodeError:
+                log.exception("the order of the queue cannot be read")
+                continue
             ranks = {each: rank for rank, each in enumerate(order)}
             self._entries.sort(key=lambda each: ranks.get(each.id, len(ranks)))
         names = {name for each in self._entries for name in each.lanes}
