@@ -215,7 +215,7 @@ def _queue(walk: Walk, start_of: Any) -> None:
     queue = walk("runner", "post", "/api/queue/robots/{name}/close", name="simulator")
     asked = {"closing": queue["robots"][0]["closed"]["closing"]}
     walk("runner", "post", "/api/queue/robots/{name}/open", asked, name="simulator")
-    look = walk("runner", "post", "/api/queue/{entry}/look", {}, entry=second)
+    look = walk.http["runner"].post(f"/api/queue/{second}/look", json={}).json()
     walk("runner", "post", "/api/queue/{entry}/start", {"look": look["look"]}, entry=second)
 
 

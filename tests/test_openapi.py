@@ -108,6 +108,6 @@ def test_bodies_that_are_read_by_hand_are_described_by_the_type_that_reads_them(
 def test_the_messages_of_the_live_socket_are_described(found: dict[str, dict[str, Any]]) -> None:
     schemas = found["runner"]["components"]["schemas"]
     kinds = schemas["RunnerMessage"]["discriminator"]["mapping"]
-    ours = {"hello", "run", "engines", "confirm", "there", "beat", "stopping", "refused"}
+    ours = {"hello", "run", "engines", "confirm", "there", "beat", "stopping", "refused", "queue"}
     assert set(kinds) == ours
     assert set(schemas["PageMessage"]["discriminator"]["mapping"]) == {"stop", "here"}

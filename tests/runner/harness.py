@@ -241,6 +241,7 @@ class Robot:
         self.old = 0.01
         self.silent = False
         self.indexes: bool | None = False
+        self.known_graphs: tuple[str, ...] = ()  # that it has indexed, as text
         self.tasks: TaskGroup | None = None  # for messages under way
         self.starts: list[Order] = []
         self.stops: list[tuple[float, str]] = []
@@ -314,7 +315,8 @@ class Robot:
         shown = tuple(self._blinded(each, answer) for each in answer.graphs)
         graphs = self.engine._engine.graphs
         texts = {each.graph: codec.write(graphs[each.graph].graph) for each in shown}
-        return msgspec.structs.replace(answer, graphs=shown, texts=texts)
+        known = self.known_graphs
+        return msgspec.structs.replace(answer, graphs=shown, texts=texts, known_graphs=known)
 
     def _blinded(self, shown: Snapshot, answer: Answer) -> Snapshot:
         began = self._began.get(shown.run or "", -1e9)

@@ -31,7 +31,7 @@ def put(server: Server, start: dict[str, Any], options: argparse.Namespace) -> i
 
 
 def _add_queue(queue: argparse.ArgumentParser) -> None:
-    add_server(queue, "")
+    add_server(queue, "start ENTRY --watching David")
     queue.add_argument("--json", action="store_true", help="as JSON, for programs")
     queue.set_defaults(handler=_list)
     more = queue.add_subparsers(metavar="start | move | remove | close | open")

@@ -14,6 +14,7 @@ from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Held, StopRequested
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.limits import Limit
 from action_assistant.umrf.model import Remap
 from runner.execution.test_conducted_subgraphs import TASK, sent
@@ -187,6 +188,7 @@ async def test_after_a_restart_of_the_runner_pieces_are_held_to_the_limits() -> 
 async def test_a_graph_inside_of_a_piece_is_held_to_the_limits() -> None:
     inner = msgspec.structs.replace(task(parameter("torque", "number", 61)), name="Pick")
     lab = Plain({"*": [{"after_s": 1}]})
+    lab.david.known_graphs = (codec.write(inner),)
     async with lab.runner() as control:
         await limit(control, "Carol")
         await limit(control, "David", Rules(limits=(Limit(parameter="torque", most=61),)))

@@ -1095,7 +1095,7 @@ export interface RunnerApi {
     };
     /**
      * HealthShown
-     * @description Something of a robot's health as it was when the robot was read. `text`: all of it in words, but its
+     * @description A report of a robot's health as it was when the robot was read. `text`: all of it in words, but its
      *     age; `follows`: for a start, null for nothing; `heard_at`: when its newest message came.
      */
     HealthShown: {

@@ -52,6 +52,7 @@ from action_assistant.runner.start.orders import (
     engines_of,
     order_of,
     overridden_in,
+    require_plain,
     watched_in,
 )
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
@@ -207,7 +208,7 @@ class StartChecks:
             self._robots.reachable(request.engine),
             self._rights.limits([request.engine]),
         )
-        _require_plain(request)
+        require_plain(request)
         prepare = partial(prepared, earlier=earlier, limits=limits)
         ready = await self._run_in_worker(prepare, request, robot.facts, random_id())
         order = order_of(request, ready.tree_digest, overridden_in(request), limits)
@@ -255,7 +256,7 @@ class StartChecks:
         """Take the start of a led run through all checks, with all its robots at the same
         time. `starter`: the person. Raise Conflict, with the reasons of all robots, if a
         check refuses it."""
-        _require_plain(request)
+        require_plain(request)
         watched_in(request.watching, engines_of(request))
         earlier = await self._earlier.read(request, starter)
         limits = self._rights.limits(engines_of(request))
@@ -469,9 +470,8 @@ class StartChecks:
 
     async def look(self, group: GroupRequest, starter: Identity) -> list[Preflight]:
         """Return the pre-flight of a start on each engine that `group` names. `starter`: the
-        person who would start. A refusal becomes an item of the pre-flight. Nothing is stored,
-        and engines are only asked for their graphs; the call waits for their answers. Raise
-        Unavailable if a worker dies."""
+        person who would start. A refusal becomes an item of the pre-flight. Nothing is stored;
+        engines are only asked for their graphs. Raise Unavailable if a worker dies."""
         if any(self.leads(engine, group.robots) for engine in group.engines):
             return await self._look_conducted(group.for_engine(CONDUCTED), starter)
         found: dict[str, Preflight] = {}
@@ -480,21 +480,21 @@ class StartChecks:
         refused: list[Refused] = []
 
         async def look(engine: str) -> None:
+            found[engine] = await self._look(group.for_engine(engine), starter)
+
+        async def check_courses() -> None:
+            courses.extend(await self._course_items(group, starter))
+
+        async def kept(work: Awaitable[None]) -> None:
             try:
-                found[engine] = await self._look(group.for_engine(engine), starter)
+                await work
             except Refused as error:  # such as a worker that has died; a task group would wrap it
                 refused.append(error)
 
-        async def check_courses() -> None:
-            try:
-                courses.extend(await self._course_items(group, starter))
-            except Refused as error:
-                refused.append(error)
-
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(check_courses)
+            tasks.start_soon(kept, check_courses())
             for engine in group.engines:
-                tasks.start_soon(look, engine)
+                tasks.start_soon(kept, look(engine))
         if refused:
             raise refused[0]
         looks = [preflight.with_items(found[engine], courses) for engine in group.engines]
@@ -642,14 +642,6 @@ def _code_of(refused: Refused) -> str:
 def _named(order: str, ready: Prepared) -> str:
     """Return in words what a second person says yes to."""
     return "this graph" if order == ready.tree_digest else "this start"
-
-
-def _require_plain(request: StartRequest) -> None:
-    """Raise BadInput if a start on a robot has fields that only the simulator understands."""
-    if request.like is not None:
-        raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
-    if request.behaviours:
-        raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
 
 
 def require_led(robot: KnownEngine) -> None:

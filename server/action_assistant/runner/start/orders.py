@@ -84,3 +84,11 @@ def kept_for(request: StartRequest) -> tuple[str, ...]:
     since = request.start_from
     continued = (f"run/{since.run}",) if since is not None and since.continues else ()
     return (*engines_of(request), *continued)
+
+
+def require_plain(request: StartRequest) -> None:
+    """Raise BadInput if a start on a robot has fields that only the simulator understands."""
+    if request.like is not None:
+        raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+    if request.behaviours:
+        raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
