@@ -72,7 +72,7 @@ async function annotate(page: Page, name: string, words: string): Promise<void> 
   await description(page).fill(words);
   await description(page).press("ControlOrMeta+Enter");
   await page.keyboard.press("F6");
-  await saved(page);
+  await expect.poll(async () => JSON.stringify(await meaningOf(product, task))).toContain(words);
 }
 
 test("one makes a sub-graph while another edits, both see it, and undo brings all back", async () => {
