@@ -27,6 +27,7 @@ export function useQueue() {
     queryFn: ({ signal }) => runnerAt(runner).get("/api/queue", { signal }),
     enabled: runner !== undefined,
     placeholderData: keepPreviousData,
+    gcTime: 0, // a page that comes again begins to count anew, and must not be shown an old queue
   });
 }
 

@@ -18,6 +18,7 @@ import { useMay, usePerson } from "../api/people";
 import { type Run, useLastRun } from "../api/runs";
 import { EditorStoreProvider, useEditorStore } from "../canvas/editor-store";
 import { levelsOf } from "../canvas/level-path";
+import { firstViewIsThere } from "../clock/first-view";
 import { serverNow } from "../clock/server-clock";
 import { scriptOf } from "../dry-run/script";
 import { useSeed } from "../editor/dry-run/use-seed";
@@ -309,6 +310,7 @@ function TitledBar(parts: Omit<ComponentProps<typeof PageBar>, "graph">) {
 }
 
 function Gone() {
+  useEffect(firstViewIsThere, []);
   return (
     <Nowhere crumb="Gone" title="There is no such graph">
       It was deleted, or the address belongs to another server.
@@ -323,6 +325,7 @@ function useIsAction(id: string): boolean {
 
 export function GraphScreen({ id }: { id: string }): ReactNode {
   const { person } = usePerson();
+  useEffect(() => firstViewIsThere, []); // whoever leaves before it comes
   if (useIsAction(id)) return <Redirect to={`/actions/${id}`} replace />;
   return (
     <PageFrame>

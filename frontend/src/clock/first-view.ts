@@ -7,7 +7,7 @@ const LONGEST = 10_000;
 let isThere = true;
 const listeners = new Set<() => void>();
 
-/** Has everything that the first view does not need wait for it, for some seconds at most. */
+/** Starts the wait for the first view: what it does not need waits with it, for some seconds at most. */
 export function expectFirstView(): void {
   isThere = false;
   setTimeout(firstViewIsThere, LONGEST);
@@ -17,7 +17,13 @@ export function expectFirstView(): void {
 export function firstViewIsThere(): void {
   if (isThere) return;
   isThere = true;
-  for (const listener of [...listeners]) listener();
+  for (const listener of [...listeners]) {
+    try {
+      listener();
+    } catch (error) {
+      reportError(error); // the others hear of it all the same
+    }
+  }
 }
 
 function subscribe(listener: () => void): () => void {

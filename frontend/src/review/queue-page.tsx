@@ -111,7 +111,7 @@ function Items({ look }: { look: QueueLook }) {
   return (
     <ul className={style.items}>
       {worth.map(({ engine, code, verdict, text }) => (
-        <li key={`${engine} ${code}`} data-verdict={verdict}>
+        <li key={`${engine} ${code} ${text}`} data-verdict={verdict}>
           {verdict === "blocked" ? "In the way: " : "Note: "}
           {text}
         </li>
@@ -142,7 +142,8 @@ function Turn({ entry }: { entry: QueueEntry }) {
   const { runner } = useLive();
   const blocked = (found?.looks ?? []).flatMap(({ items }) =>
     items.filter(({ verdict, overridable, code }) =>
-      verdict === "blocked" ? !overridable && code !== "watched" : false,
+      // Whoever has to confirm is asked when they start; what they watch is said beside the button.
+      verdict === "blocked" ? !overridable && code !== "watched" && code !== "confirm" : false,
     ),
   );
   const what = `Start ${isolated(entry.graph_name)} ${named(entry)}`;
@@ -171,7 +172,10 @@ function Turn({ entry }: { entry: QueueEntry }) {
         <Button
           variant={found ? "subtle" : "filled"}
           loading={look.isPending}
-          onClick={() => look.mutate()}
+          onClick={() => {
+            start.reset();
+            look.mutate();
+          }}
         >
           {found ? "Look again" : "Look before the start"}
         </Button>

@@ -15,16 +15,21 @@ vi.stubGlobal("matchMedia", () => ({
 let root: Root;
 const onStart = vi.fn();
 
-beforeEach(() => {
-  onStart.mockReset();
-  root = createRoot(document.body.appendChild(document.createElement("div")));
+function draw(disabled: boolean): void {
+  const props = { label: "Run", name: "Run v1", disabled, question: null, onStart };
   act(() =>
     root.render(
       <MantineProvider>
-        <StartButton label="Run" name="Run v1" disabled={false} question={null} onStart={onStart} />
+        <StartButton {...props} />
       </MantineProvider>,
     ),
   );
+}
+
+beforeEach(() => {
+  onStart.mockReset();
+  root = createRoot(document.body.appendChild(document.createElement("div")));
+  draw(false);
 });
 
 afterEach(() => {
@@ -60,4 +65,17 @@ test("a tap is a click and nothing else; a finger that slips off or scrolls star
   finger("pointercancel", 19_300);
   finger("pointerup", 19_900);
   expect(onStart).toHaveBeenCalledTimes(1);
+});
+
+test("a finger that holds a disabled button starts nothing, nor one whose button is disabled meanwhile", () => {
+  finger("pointerdown", 1_000);
+  draw(true);
+  finger("pointerup", 1_900);
+  finger("pointerdown", 9_000);
+  draw(false);
+  finger("pointerup", 9_900);
+  draw(true);
+  finger("pointerdown", 19_000);
+  finger("pointerup", 19_900);
+  expect(onStart).toHaveBeenCalledTimes(0);
 });

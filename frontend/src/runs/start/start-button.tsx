@@ -23,9 +23,10 @@ const LONG = 400; // ms; browsers take a longer press of a finger for no click
 
 /**
  * Presses of a finger that last too long to be a click, so that holding a button starts as pressing it
- * does. Where a browser sends the click all the same, one start comes of both.
+ * does. Where a browser sends the click all the same, one start comes of both. A disabled button still gets
+ * events of pointers: they start nothing.
  */
-function usePress(onPress: () => void) {
+function usePress(disabled: boolean, onPress: () => void) {
   const down = useRef<number | null>(null);
   const taken = useRef(Number.NEGATIVE_INFINITY);
   const forget = () => {
@@ -33,12 +34,13 @@ function usePress(onPress: () => void) {
   };
   return {
     onPointerDown: (event: PointerEvent) => {
+      if (disabled) return;
       down.current = event.pointerType === "touch" ? event.timeStamp : null;
     },
     onPointerUp: (event: PointerEvent<HTMLElement>) => {
       const held = down.current !== null && event.timeStamp - down.current >= LONG;
       forget();
-      if (!held) return;
+      if (disabled || !held) return;
       const box = event.currentTarget.getBoundingClientRect();
       const inside =
         event.clientX >= box.left &&
@@ -60,7 +62,7 @@ function usePress(onPress: () => void) {
 }
 
 export function StartButton({ question, onStart, ...look }: Props) {
-  const press = usePress(onStart);
+  const press = usePress(look.disabled, onStart);
   if (question !== null) return <HoldButton {...look} question={question} onHeld={onStart} />;
   const { label, name, disabled, size, icon } = look;
   return (
