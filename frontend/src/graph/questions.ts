@@ -2,7 +2,7 @@
 
 import templates from "../api/schema/ready-made.json";
 
-/** What people call them, by the names by which the runner knows them. */
+/** Names of ready-made actions for people, by the names by which the runner knows them. */
 const READY_MADE: ReadonlyMap<string, string> = new Map(
   templates.map(({ name, title }) => [name, title]),
 );

@@ -42,7 +42,7 @@ _SETTINGS: Final = {
 }
 #: One statement that inserts events if each of their streams still ends where the writer read its end, and
 #: moves those ends. If one does not, the column `position`, which is never null, would become null: the
-#: server refuses the whole statement, and nothing is written (decision 151).
+#: server refuses the whole statement, and nothing is written (decision 150).
 _STORE: Final = """
 WITH known AS (
     SELECT * FROM unnest($9::text[], $10::bigint[], $11::bytea[], $12::bigint[], $13::bytea[])

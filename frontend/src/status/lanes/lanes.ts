@@ -102,7 +102,7 @@ export function openLanes<One extends Pick<Lane, "name" | "around">>(
   });
 }
 
-/** Who carries out actions that no robot does, as runs call them, and as people read them. */
+/** Names for those who carry out actions that no robot does, by the word that a run has for them. */
 const NO_ROBOTS: ReadonlyMap<string, string> = new Map([
   ["people", "People"],
   ["runner", "The runner"],
