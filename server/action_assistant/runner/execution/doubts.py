@@ -107,6 +107,8 @@ class DoubtWatch(Generic[C]):
         if engine.state == "gone":
             return f"{robot} was lost. {engine.why}".strip()
         now = self._life(robot)
+        if not life:
+            closable.lives[robot] = now  # it was not known yet
         return f"The engine of {robot} was started again." if life and now not in {"", life} else ""
 
     def _life(self, robot: str) -> str:

@@ -17,7 +17,7 @@ from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.start.admission import StartRequest, Watching
-from action_assistant.runner.start.kept_starts import text_of
+from action_assistant.runner.start.kept_starts import ordered_in
 from action_assistant.runner.start.orders import engines_of
 from action_assistant.runner.start.preflight import Item, Preflight
 from action_assistant.umrf.start_values import StartValues
@@ -207,7 +207,7 @@ def request_of(entry: str) -> str:
 
 def order_of(request: QueueRequest) -> str:
     """Return the hash of all that an entry orders."""
-    return hashlib.sha256(bytes(text_of(request.start)) + b"%d" % request.by_itself).hexdigest()
+    return hashlib.sha256(ordered_in(request.start) + b"%d" % request.by_itself).hexdigest()
 
 
 def require_queueable(request: QueueRequest) -> None:

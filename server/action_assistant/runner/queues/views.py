@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 
 from action_assistant.runner.links.port import SIMULATOR
-from action_assistant.runner.queues.entry import Wait, Waiting, named
+from action_assistant.runner.queues.entry import QueueClosed, Wait, Waiting, named
 from action_assistant.runner.queues.lanes import Entry, Lane, Look
 from action_assistant.runner.queues.service import Queues, closing_of
 from action_assistant.runner.runs.doubts import ClosedWhy
@@ -117,7 +117,7 @@ def queue_view(
         RobotQueueShown(
             robot=name,
             entries=[each.id for each in queues.entries if name in each.lanes],
-            closed=_closed(lane),
+            closed=_closed(lane, unseen),
         )
         for name, lane in lanes.items()
     ]
@@ -172,7 +172,9 @@ def _waiting(
     match wait.why:
         case "closed":
             closed = lanes[robot].closed
-            text = f"The queue of {name} is closed. {'' if closed is None else closed.text}"
+            text = (
+                f"The queue of {name} is closed. {'' if closed is None else _why(closed, unseen)}"
+            )
         case "behind":
             others = "1 other" if wait.behind == 1 else f"{wait.behind} others"
             text = f"It is behind {others} for {name}."
@@ -200,14 +202,24 @@ def _running(robot: str, run: Run, unseen: Unseen | None) -> str:
     return f"{robot} is running {graph}, by {who}."
 
 
-def _closed(lane: Lane) -> QueueClosedShown | None:
+def _why(closed: QueueClosed, unseen: Unseen | None) -> str:
+    """Return why a queue is closed. Details of a run or of a refused start may speak of a graph that the
+    reader may not see."""
+    if unseen is not None and closed.why == "refused":
+        return "A start of it was refused."
+    if unseen is not None and closed.why == "lost" and closed.run:
+        return "A run on it was lost."
+    return closed.text
+
+
+def _closed(lane: Lane, unseen: Unseen | None) -> QueueClosedShown | None:
     closed = lane.closed
     if closed is None:
         return None
     return QueueClosedShown(
         closing=closing_of(closed),
         why=closed.why,
-        text=closed.text,
+        text=_why(closed, unseen),
         at=time(closed.at),
         by=closed.by,
         run=closed.run or None,

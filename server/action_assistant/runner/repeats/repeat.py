@@ -17,7 +17,7 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.start.admission import StartRequest, Watching
-from action_assistant.runner.start.kept_starts import graph_of, start_of, text_of
+from action_assistant.runner.start.kept_starts import graph_of, ordered_in, start_of
 from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.start_values import StartValues, Value, WrongValue, with_values
 
@@ -190,7 +190,7 @@ def repeat_id(request_id: str) -> str:
 
 def order_of(request: RepeatRequest) -> str:
     """Return the hash of all that a repeat orders."""
-    start = bytes(text_of(request.start))
+    start = ordered_in(request.start)
     rest = [request.times, request.grid, request.seed, request.by_itself]
     return hashlib.sha256(start + msgspec.json.encode(rest)).hexdigest()
 

@@ -26,6 +26,12 @@ def text_of(start: StartRequest) -> msgspec.Raw:
     return msgspec.Raw(msgspec.json.encode(fields))
 
 
+def ordered_in(start: StartRequest) -> bytes:
+    """Return as JSON what a person orders by a start. The editor seals the rules of a version anew for
+    each request, so they are no part of it."""
+    return bytes(text_of(msgspec.structs.replace(start, sight=None)))
+
+
 def start_of(text: msgspec.Raw) -> StartRequest:
     """Return the start in a text of `text_of`. Raise msgspec.DecodeError for a damaged one."""
     return msgspec.json.decode(bytes(text), type=StartRequest)
