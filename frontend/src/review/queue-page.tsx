@@ -1,10 +1,11 @@
 /** The queue: which starts wait for which robots, why and in which order; at its turn a person looks and starts one. */
 import { Button, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconHourglassEmpty } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link, useLocation } from "wouter";
-import { errorText } from "../api/http";
+import { errorText, isOutcomeUnknown } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
 import {
@@ -133,6 +134,12 @@ function Turn({ entry }: { entry: QueueEntry }) {
     onSuccess: (run) => {
       live?.learn(run);
       go(`/runs/${run.id}`);
+    },
+    onError: (error) => {
+      if (!isOutcomeUnknown(error)) return;
+      const title = `NOT KNOWN whether ${isolated(entry.graph_name)} started`;
+      const message = `${errorText(error)} Look at the runs. Another press of the same counts once. Stop works.`;
+      notifications.show({ color: "red", autoClose: false, title, message });
     },
     onSettled: () => {
       watch.forget();

@@ -8,7 +8,7 @@ const look = (...blocked: string[]): Preflight[] => [
   } as unknown as Preflight,
 ];
 
-test("the queue is offered where a robot is not free and nothing else is in the way for good", () => {
+test("the queue is offered where a robot is not free, and waiting mends all else that is in the way", () => {
   expect(mayWait(undefined)).toBe(false);
   expect(mayWait(look())).toBe(false);
   expect(mayWait(look("free"))).toBe(true);

@@ -1,17 +1,12 @@
 /** Offer in the start dialog to wait in the queue, where another run keeps a robot. */
 import { Button } from "@mantine/core";
 import { IconHourglassEmpty } from "@tabler/icons-react";
-import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useMutation } from "@tanstack/react-query";
 import { useLocation } from "wouter";
-import { queryKeys } from "../../api/graphs";
-import { errorText } from "../../api/http";
-import { insideOf } from "../../api/inside";
-import { useLive } from "../../api/page-link";
 import { enterQueue } from "../../api/queue";
 import type { Preflight } from "../../api/robots";
-import { newAid } from "../../graph/document-keys";
 import style from "./start-dialog.module.css";
-import { checkedVersion, notifyFailure, type StartInput } from "./use-start";
+import { notifyPressFailure, type StartInput, sendLookedAt, useOrder } from "./use-start";
 
 /** Items in the way that waiting, or the person at the start itself, may mend. */
 const PASSING: ReadonlySet<string> = new Set([
@@ -30,30 +25,18 @@ export function mayWait(looks: readonly Preflight[] | undefined): boolean {
 
 /** Put exactly what was looked at into the queue, and go to its page. */
 function useEnterQueue(graph: string) {
-  const { runner } = useLive();
-  const client = useQueryClient();
   const [, go] = useLocation();
+  const ordered = useOrder(graph);
   return useMutation({
     mutationFn: async (wanted: StartInput) => {
-      const { seq, digest, tree, led, watching: _, drill: __, from: ___, ...rest } = wanted;
-      if (runner === undefined) throw new Error("The address of the runner is not known yet.");
+      const { watching: _, drill: __, from: ___, ...rest } = wanted;
       // It is put there after a look only.
-      const { version, umrf } = await checkedVersion(graph, await seq, digest ?? "", tree);
-      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
-      return enterQueue({
-        ...rest,
-        runner,
-        version: version.id,
-        digest: version.digest,
-        umrf,
-        inside: insideOf(version),
-        graph,
-        request: newAid(),
-        ...(led === undefined ? {} : { led }),
-      });
+      const { order } = await ordered({ ...rest, digest: wanted.digest ?? "" });
+      return sendLookedAt("queue", order, enterQueue);
     },
     onSuccess: () => go("/runs/queue"),
-    onError: (error) => notifyFailure("Not put into the queue", errorText(error)),
+    onError: (error) =>
+      notifyPressFailure(error, "Not put into the queue", "it was put into the queue"),
   });
 }
 

@@ -1,15 +1,10 @@
 /** Choice in the start dialog of how often a start is carried out, and with which values. */
 import { Checkbox, Text, Textarea, TextInput } from "@mantine/core";
-import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { useMutation } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";
 import { useLocation } from "wouter";
-import { queryKeys } from "../../api/graphs";
-import { errorText } from "../../api/http";
-import { insideOf } from "../../api/inside";
-import { useLive } from "../../api/page-link";
 import { type Axis, openRepeat, type RepeatOrder } from "../../api/repeats";
 import type { AskedInput, StartValues } from "../../api/starts";
-import { newAid } from "../../graph/document-keys";
 import { spokenName } from "../../graph/field-words";
 import { givenBy } from "../../status/start-values";
 import { inputWords, placeOfInput } from "../../status/value-words";
@@ -17,7 +12,7 @@ import { useKeptText } from "../../ui/kept-texts";
 import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import style from "./start-dialog.module.css";
-import { checkedVersion, notifyFailure, type StartInput } from "./use-start";
+import { notifyPressFailure, type StartInput, sendLookedAt, useOrder } from "./use-start";
 
 const MOST = 500; // runs of one repeat
 
@@ -145,42 +140,18 @@ export function useRepeatChoice(
 
 /** Open a repeat of exactly what was looked at, and go to its page. */
 export function useOpenRepeat(graph: string) {
-  const { runner } = useLive();
-  const client = useQueryClient();
   const [, go] = useLocation();
+  const ordered = useOrder(graph);
   return useMutation({
     mutationFn: async ({ repeat, ...wanted }: StartInput & { repeat: RepeatOrder }) => {
-      const {
-        seq,
-        engines,
-        digest,
-        tree,
-        led,
-        values = {},
-        watching: _,
-        from: __,
-        ...rest
-      } = wanted;
-      if (runner === undefined) throw new Error("The address of the runner is not known yet.");
+      const { watching: _, from: __, values = {}, ...rest } = wanted;
       // A repeat is opened after a look only.
-      const { version, umrf } = await checkedVersion(graph, await seq, digest ?? "", tree);
-      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
-      const order = {
-        ...rest,
-        runner,
-        version: version.id,
-        digest: version.digest,
-        umrf,
-        inside: insideOf(version),
-        graph,
-        engines,
-        request: newAid(),
-        values: withoutGrid(values, repeat.grid),
-        ...(led === undefined ? {} : { led }),
-      };
-      return openRepeat(order, repeat);
+      const looked = { ...rest, digest: wanted.digest ?? "" };
+      const { order } = await ordered({ ...looked, values: withoutGrid(values, repeat.grid) });
+      const what = `repeat ${JSON.stringify(repeat)}`;
+      return sendLookedAt(what, order, (each) => openRepeat(each, repeat));
     },
     onSuccess: ({ id }) => go(`/runs/repeats/${id}`),
-    onError: (error) => notifyFailure("Not opened", errorText(error)),
+    onError: (error) => notifyPressFailure(error, "Not opened", "the repeat was opened"),
   });
 }

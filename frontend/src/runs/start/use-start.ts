@@ -8,7 +8,7 @@ import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
 import { insideOf } from "../../api/inside";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
-import { type Started, type StartOrder, startRun, type Watching } from "../../api/runs";
+import { type Started, type StartOrder, sendPress, startRun, type Watching } from "../../api/runs";
 import type { StartFrom, StartValues } from "../../api/starts";
 import { serverNow } from "../../clock/server-clock";
 import type { RunBreakpoint } from "../../graph/breakpoints";
@@ -65,11 +65,41 @@ export function notifyFailure(title: string, message: string): void {
   notifications.show({ color: "red", title, message, autoClose: 15_000 });
 }
 
+/** An error of a request whose outcome nobody knows: the message stays until a person closes it. */
+class NotKnown extends Error {}
+
+/**
+ * Send a press of what was looked at. If its answer gets lost, the next press of the same is sent with the same
+ * request id, so that the two count once, and the error says that nobody knows.
+ */
+export function sendLookedAt<T>(
+  what: string,
+  order: LookedAtOrder,
+  send: (order: StartOrder) => Promise<T>,
+): Promise<T> {
+  const { umrf: _, ...named } = order;
+  const press = sendPress(`${what} ${JSON.stringify(named)}`, (request) =>
+    send({ ...order, request }),
+  );
+  return press.catch((error: unknown) => {
+    throw isOutcomeUnknown(error) ? new NotKnown(errorText(error)) : error;
+  });
+}
+
+/** Tell that a press came to nothing, or that nobody knows. `title`: for the first; `unknown`: what is not known. */
+export function notifyPressFailure(error: unknown, title: string, unknown: string): void {
+  if (error instanceof NotKnown) {
+    const message = `${error.message} Another press of the same counts once.`;
+    const head = `NOT KNOWN whether ${unknown}`;
+    notifications.show({ color: "red", autoClose: false, title: head, message });
+  } else notifyFailure(title, errorText(error));
+}
+
 /**
  * Publish the graph as it is at a change, and return that version. Rejects where it is not the one that was checked.
  * `digest`, `tree`: of what was checked; a null digest where nothing was.
  */
-export async function checkedVersion(
+async function checkedVersion(
   graph: string,
   seq: number,
   digest: string | null,
@@ -83,38 +113,37 @@ export async function checkedVersion(
   return published;
 }
 
-export function useStart(graph: string) {
-  const { live, runner } = useLive();
+/** A start as it was looked at, without an id of its own yet. */
+export type LookedAtOrder = Omit<StartOrder, "request">;
+
+/**
+ * Return a function that publishes what was looked at, and returns it as an order with its version. It rejects
+ * where the graph is not the one that was looked at.
+ */
+export function useOrder(graph: string) {
+  const { runner } = useLive();
   const client = useQueryClient();
+  return async (wanted: StartInput): Promise<{ version: Version; order: LookedAtOrder }> => {
+    const { seq, digest, tree, from, ...rest } = wanted;
+    if (runner === undefined) throw new Error("The address of the runner is not known yet.");
+    const { version, umrf } = await checkedVersion(graph, await seq, digest, tree);
+    void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
+    const what = { version: version.id, digest: version.digest, umrf, inside: insideOf(version) };
+    const order = { ...rest, ...(from === undefined ? {} : { from }), ...what, runner, graph };
+    return { version, order };
+  };
+}
+
+export function useStart(graph: string) {
+  const { live } = useLive();
+  const client = useQueryClient();
+  const ordered = useOrder(graph);
   return useMutation({
     mutationFn: async (wanted: StartInput) => {
-      const { seq, engines, led, digest, tree, script, behaviours, override, watching, drill } =
-        wanted;
-      const { breakpoints, values, from } = wanted;
-      if (runner === undefined) throw new Error("The address of the runner is not known yet.");
-      const { version, umrf } = await checkedVersion(graph, await seq, digest, tree);
-      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
+      const { version, order } = await ordered(wanted);
       const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
       const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
-      const started = await surely(what, {
-        runner,
-        version: version.id,
-        digest: version.digest,
-        umrf,
-        inside: insideOf(version),
-        graph,
-        engines,
-        request: newAid(),
-        ...(led === undefined ? {} : { led }),
-        ...(script === undefined ? {} : { script }),
-        ...(behaviours === undefined ? {} : { behaviours }),
-        ...(override === undefined ? {} : { override }),
-        ...(watching === undefined ? {} : { watching }),
-        ...(drill === undefined ? {} : { drill }),
-        ...(breakpoints === undefined ? {} : { breakpoints }),
-        ...(values === undefined ? {} : { values }),
-        ...(from === undefined ? {} : { from }),
-      });
+      const started = await surely(what, { ...order, request: newAid() });
       for (const run of started.runs) live?.learn(run);
       return started;
     },
