@@ -16,6 +16,9 @@ import { restAfterLostFields } from "../ui/focus-field";
 import { App, ViewApp } from "./app";
 import { preloadAt, preloadWhenIdle, ViewScreen } from "./screens";
 
+// In a build each component brings it along (`vite.config.ts`).
+if (import.meta.env.DEV) void import("../ui/mantine-more.css");
+
 restAfterLostFields(() => void import("../ui/messages").then((part) => part.tellKeysRest()));
 if (isViewPage) void ViewScreen.preload();
 else void preloadAt(location.pathname).then(preloadWhenIdle).then(keepPage);

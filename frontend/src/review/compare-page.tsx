@@ -244,7 +244,13 @@ function Choose({ runner, b, asked }: { runner: string; b: string; asked: boolea
   return (
     <Empty
       icon={<IconArrowsDiff size={22} />}
-      title={asked ? "Compare with which run?" : "There is no run before it: compare with which?"}
+      title={
+        asked
+          ? "Which run do you want to compare with?"
+          : before.isError
+            ? "The run before could not be found. Which run do you want to compare with?"
+            : "No run came before. Which run do you want to compare with?"
+      }
     >
       <Select
         aria-label="Run to compare with"

@@ -6,15 +6,28 @@ const NOW = Date.parse("2026-11-24T12:00:00");
 const DAY = 86_400_000;
 
 function run(number: number, graph: string | null, at = NOW, more: Partial<RunOfList> = {}) {
-  const started_at = new Date(at).toISOString();
-  return { id: `r${number}`, number, graph, graph_name: "walk", started_at, ...more } as RunOfList;
+  const requested_at = new Date(at).toISOString();
+  return {
+    id: `r${number}`,
+    number,
+    graph,
+    graph_name: "walk",
+    requested_at,
+    ...more,
+  } as RunOfList;
 }
 
-test("runs stand by the day on which they began, in their order", () => {
+test("runs stand by the day on which they were asked for, in their order", () => {
   const runs = [run(4, "a"), run(3, "a", NOW - 1000), run(2, "b", NOW - DAY), run(1, "a", 0)];
   const days = byDay(runs, NOW);
   expect(days.map((each) => each.runs.map(({ number }) => number))).toEqual([[4, 3], [2], [1]]);
   expect(days.slice(0, 2).map((each) => each.day)).toEqual(["today", "yesterday"]);
+  const late = { started_at: new Date(NOW).toISOString() };
+  const over = byDay([run(3, "a"), run(2, "a", NOW - DAY, late), run(1, "a", NOW - DAY)], NOW);
+  expect(over.map((each) => [each.key, each.runs.length])).toEqual([
+    ["today", 1],
+    ["yesterday", 2],
+  ]);
 });
 
 test("the run before is of the same graph, and none that is hidden", () => {

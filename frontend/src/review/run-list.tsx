@@ -22,20 +22,24 @@ import style from "./run-list.module.css";
 /** A stored run, with the actions that the live socket knows of it. */
 export type RunOfList = ListedRun & Pick<Run, "actions">;
 
-/** Return the runs by the day on which they were asked for, in their order. */
+/** Return the runs by the day on which they were asked for, which is their order, with a key for each day. */
 export function byDay(runs: readonly RunOfList[], now: number) {
-  const days: { day: string; runs: RunOfList[] }[] = [];
+  const days: { key: string; day: string; runs: RunOfList[] }[] = [];
   for (const run of runs) {
-    const of = day(instant(run.started_at ?? run.requested_at) ?? now, now);
+    const of = day(instant(run.requested_at) ?? now, now);
     const last = days.at(-1);
     if (last?.day === of) last.runs.push(run);
-    else days.push({ day: of, runs: [run] });
+    // A clock that was set back gives a day twice.
+    else {
+      const key = days.some((other) => other.key === of) ? `${of} ${run.id}` : of;
+      days.push({ key, day: of, runs: [run] });
+    }
   }
   return days;
 }
 
 /**
- * Return the number of the run of the same graph before each run, by id, as far as it is in the list.
+ * Return the run of the same graph before each run, by its id, as far as it is in the list.
  * `runs`: the newest first, and none left out by a filter.
  */
 export function runsBefore(runs: readonly RunOfList[]): ReadonlyMap<string, RunOfList> {
@@ -152,7 +156,7 @@ function Row({ run, now, chosen, onChoose, before }: RunRowProps) {
               of <bdi>{run.graph_name}</bdi>
             </span>
           ) : (
-            run.graph_name
+            <bdi>{run.graph_name}</bdi>
           )}
         </Link>{" "}
         {!run.hidden && (
@@ -243,7 +247,7 @@ export function RunList({ runs, chosen, onChoose, isGapless, goesOn }: RowsProps
           </tr>
         </thead>
         {byDay(runs, now).map((group) => (
-          <tbody key={`${group.day} ${group.runs[0]?.id}`}>
+          <tbody key={group.key}>
             <tr className={style.day}>
               <th scope="rowgroup" colSpan={COLUMNS}>
                 {group.day}

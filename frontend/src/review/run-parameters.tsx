@@ -21,7 +21,7 @@ function Value({ text, differs }: { text: string | null; differs: boolean }) {
   );
 }
 
-/** A number over the visits, in the room of a word; where the values say more than the last ones beside it. */
+/** A number over the visits of an action, as a chart of the height of a line. */
 function ValueChart({ over }: { over: readonly number[] }) {
   const [low, high] = [Math.min(...over), Math.max(...over)];
   const at = (value: number) => (high === low ? 9 : 17 - ((value - low) / (high - low)) * 16);

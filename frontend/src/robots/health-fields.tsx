@@ -52,7 +52,24 @@ interface FieldsProps {
   onRemove: () => void;
 }
 
-const follows = (value: string | null) => (value === "block" ? "block" : "warn");
+interface FollowProps {
+  label: string;
+  value: HealthCheck["poor"];
+  onChange: (value: HealthCheck["poor"]) => void;
+}
+
+function Follow({ label, value, onChange }: FollowProps) {
+  return (
+    <Select
+      size="xs"
+      label={label}
+      allowDeselect={false}
+      data={FOLLOWS}
+      value={value}
+      onChange={(chosen) => onChange(chosen === "block" ? "block" : "warn")}
+    />
+  );
+}
 
 function CheckFields({ check, name, onChange, onRemove }: FieldsProps) {
   const number = (value: string | number, before: number) =>
@@ -117,21 +134,16 @@ function CheckFields({ check, name, onChange, onRemove }: FieldsProps) {
         />
       </Group>
       <Group grow align="end">
-        <Select
-          size="xs"
+        <Follow
           label="If poor"
-          allowDeselect={false}
-          data={FOLLOWS}
           value={check.poor}
-          onChange={(value) => onChange({ poor: follows(value), unknown: follows(value) })}
+          // What blocks when it is poor blocks when it is unknown, too; the other way round a person says so.
+          onChange={(poor) => onChange(poor === "block" ? { poor, unknown: poor } : { poor })}
         />
-        <Select
-          size="xs"
+        <Follow
           label="If unknown"
-          allowDeselect={false}
-          data={FOLLOWS}
           value={check.unknown}
-          onChange={(value) => onChange({ unknown: follows(value) })}
+          onChange={(unknown) => onChange({ unknown })}
         />
         <Button size="xs" aria-label={`Remove ${isolated(name)}`} onClick={onRemove}>
           Remove
@@ -158,8 +170,8 @@ export function HealthFields({ drafts, onChange }: Props) {
       <legend className={style.legend}>Health that is looked at before a start</legend>
       <Text size="xs" c="dimmed">
         Information, no safety function: it is shown, and asked about at a start. It closes no gate
-        and stops nothing; what blocks, blocks a start only. No publisher, another type, no valid
-        value or an old message are unknown.
+        and stops nothing; what blocks, blocks a start only. Health is unknown while nothing
+        publishes it, the type is another one, the value is not valid, or the message is old.
       </Text>
       {drafts.map((each, index) => (
         <CheckFields
