@@ -21,20 +21,18 @@ from action_assistant.runner.queues.entry import (
     QueueReady,
     QueueRequest,
     TurnRequest,
-    differences,
-    digest_of,
-    looked_of,
     stream_of,
 )
 from action_assistant.runner.queues.lanes import Entry, Lane
 from action_assistant.runner.queues.service import Queues, closing_of
 from action_assistant.runner.queues.views import queue_view
 from action_assistant.runner.robots.rights import Operator, Rules
+from action_assistant.runner.runs.doubts import Doubt
 from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sight import Unseen
 from action_assistant.runner.runs.sight import run_graphs as _of
-from action_assistant.runner.start.preflight import Item, Preflight, Verdict
+from action_assistant.runner.start.preflight import Preflight
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.workers.lanes import Crashed
 from runner.execution.test_conductor import led, shared
@@ -552,16 +550,19 @@ async def test_at_its_turn_the_runner_looks_and_says_what_differs() -> None:
         assert "The rules of David have changed." in entry.differs
 
 
-def test_one_of_several_checks_of_a_robot_that_is_worse_now_is_said() -> None:
-    def look(*verdicts: Verdict) -> list[Preflight]:
-        items = [Item(code="health", verdict=each, text=f"It is {each}.") for each in verdicts]
-        return [Preflight("David", "", "", tuple(items), (), False)]
-
-    before, now = look("passed", "passed"), look("warned", "passed")
-    seen = looked_of(before, {})
-    assert digest_of(seen) != digest_of(looked_of(now, {}))
-    assert differences(seen, looked_of(now, {}), now) == ("It is warned.",)
-    assert differences(seen, seen, before) == ()
+@virtual
+async def test_why_a_queue_is_closed_quotes_no_run_and_no_refusal_to_who_may_not_see_all() -> None:
+    lab = Lab()
+    async with lab.runner() as (_, queues):
+        await put(queues, on("David"))
+        unseen = Unseen(BEN.person.id, frozenset({"hidden"}))
+        for doubt in (Doubt("refused", "Pick secret."), Doubt("lost", "Pick secret.", run="r")):
+            queues._doubts.meet(lane(queues, "David"), doubt)
+            for reader in (None, unseen):
+                shown = queue_view(queues, lambda _: None, reader)
+                text = msgspec.json.encode(shown).decode()
+                assert ("secret" in text) == (reader is None)
+            await reopened(queues, "David")
 
 
 @virtual
