@@ -22,7 +22,7 @@ from action_assistant.kit.clock import utc_us
 from action_assistant.schema.editor_tables import outbox
 from action_assistant.web.notifications.delivery import NotDelivered
 from action_assistant.web.notifications.messages import Message
-from action_assistant.web.notifications.outbox import RETRIES_S, id_of, row
+from action_assistant.web.notifications.outbox import RETRIES_S, DueMessage, id_of, row
 from action_assistant.web.notifications.receivers import Receiver
 from action_assistant.web.notifications.sender import Notifications
 from support.doses import examples
@@ -307,7 +307,9 @@ async def test_another_address_of_a_receiver_is_tried_again(tmp_path: Path) -> N
     old = Notifications(
         journal, [webhook("https://a.example/", "a")], ["run.ended"], "", _seen_by_all
     )
-    await old.outbox.switch_off(old.receivers[0], "Gone.", utc_us())
+    message = Message(id="run/x:1:a", kind="run.ended", at=utc_us(), facts={})
+    due, receiver = DueMessage(message, 0), old.receivers[0]
+    await old.outbox.failed(due, "Gone.", utc_us(), is_final=True, of=receiver)
     assert (await old.states())[0].off == "Gone."
     new = Notifications(
         journal, [webhook("https://c.example/", "a")], ["run.ended"], "", _seen_by_all

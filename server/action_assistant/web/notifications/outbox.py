@@ -28,6 +28,7 @@ _KEPT_US: Final = 30 * 24 * 3600 * 1_000_000  # after which a finished message i
 #: After which nobody wants to hear of it at all, as after a server was off for long.
 _TOO_OLD_US: Final = 7 * 24 * 3600 * 1_000_000
 _S: Final = 1_000_000
+_GIVEN_UP: Final = "Its last try has failed, too; nothing is sent any more."
 _LEFT: Final = "left"  # beside the facts of a row: `Message.left`
 
 # The tables are the same for both branches.
@@ -149,33 +150,36 @@ class Outbox:
         *,
         is_final: bool = False,
         left: tuple[str, ...] = (),
-    ) -> bool:
-        """Record that a try has failed, and when the next one is; return False if there is none,
-        since that was the last one (`is_final`: in any case). `why`: a sentence; `now`: microseconds
-        UTC; `left`: the mail addresses that have refused it while others took it, and that alone get
-        it again."""
+        of: Receiver | None = None,
+    ) -> str:
+        """Record that a try has failed, and when the next one is. If there is none, since that was
+        the last one (`is_final`: in any case), nothing is sent to the receiver `of` from now on.
+        Return why it was switched off, "" if it was not.
+
+        `why`: a sentence; `now`: microseconds UTC; `left`: the mail addresses that have refused the
+        message while others took it, and that alone get it again; `of`: None where a failure of this
+        message says nothing against its receiver."""
         is_last = is_final or due.tries >= len(RETRIES_S)
         again = None if is_last else now + RETRIES_S[due.tries] * _S
         values: dict[str, object] = {"tries": due.tries + 1, "due": again, "tried_at": now}
         if left:
             facts = {**due.message.facts, _LEFT: left}
             values |= {"facts": msgspec.json.encode(facts).decode(), "sent_at": now}
-        await self._change(due.message.id, **values, error=why)
-        return not is_last
+        change = update(_outbox).where(_c.id == due.message.id).values(**values, error=why)
+        reason = why if is_final else f"{why} {_GIVEN_UP}"
+
+        def keep(connection: Connection) -> None:
+            connection.execute(change)
+            if is_last and of is not None:
+                _switch_off(connection, of, reason, now)
+
+        # In one transaction: no message after the last try is tried once more.
+        await self._journal.derive(keep)
+        return reason if is_last and of is not None else ""
 
     async def give_up(self, id_: str, why: str) -> None:
         """Record that a message is not tried any more. `why`: a sentence."""
         await self._change(id_, due=None, error=why)
-
-    async def switch_off(self, receiver: Receiver, why: str, now: int) -> None:
-        """Send nothing to a receiver from now on. `why`: a sentence."""
-        values = {"name": receiver.name, "target": target_of(receiver), "off_at": now, "why": why}
-
-        def switch(connection: Connection) -> None:
-            connection.execute(delete(_off).where(_off.c.name == receiver.name))
-            connection.execute(insert(_off).values(values))
-
-        await self._journal.derive(switch)
 
     async def tested(self, receiver: Receiver, message: Message, error: str, now: int) -> None:
         """Record the outcome of a test. A receiver that has taken it is on again. `error`: the reason
@@ -216,6 +220,12 @@ class Outbox:
     async def _change(self, id_: str, **values: Any) -> None:
         change = update(_outbox).where(_c.id == id_).values(values)
         await self._journal.derive(lambda connection: connection.execute(change))
+
+
+def _switch_off(connection: Connection, receiver: Receiver, why: str, now: int) -> None:
+    values = {"name": receiver.name, "target": target_of(receiver), "off_at": now, "why": why}
+    connection.execute(delete(_off).where(_off.c.name == receiver.name))
+    connection.execute(insert(_off).values(values))
 
 
 def _state(

@@ -31,7 +31,6 @@ _LOOK_S: Final = 2.0  # between two looks into the outbox
 _GAP_S: Final = 0.2  # between two messages to one receiver
 _PRUNE_S: Final = 6 * 3600.0
 _TRY_S: Final = 40.0  # longer than any try lasts
-_GIVEN_UP: Final = "Its last try has failed, too; nothing is sent any more."
 
 #: Returns whether everybody may see the graph that a message is about.
 SeenByAll = Callable[[Message], Awaitable[bool]]
@@ -157,14 +156,20 @@ class Notifications:
             await self._until_stored(self.outbox.sent, id_, now)
             return
         log.warning("%s was not sent to %s: %s", id_, receiver.name, failure)
-        why, is_final = str(failure), failure.is_final
-        goes_on = await self._until_stored(
-            self.outbox.failed, due, why, now, is_final=is_final, left=failure.left
-        )
         # One address that refuses takes the messages from no other one.
         others_took_it = bool(failure.left or due.message.left)
-        if not (goes_on or others_took_it or isinstance(failure, _OwnFault)):
-            await self._switch_off(receiver, why if is_final else f"{why} {_GIVEN_UP}", now)
+        is_own = isinstance(failure, _OwnFault)
+        off = await self._until_stored(
+            self.outbox.failed,
+            due,
+            str(failure),
+            now,
+            is_final=failure.is_final,
+            left=failure.left,
+            of=None if others_took_it or is_own else receiver,
+        )
+        if off:
+            log.error("nothing is sent to %s any more: %s", receiver.name, off)
 
     async def _named(self, message: Message) -> Message:
         """Return a message as it may be sent now: without the name of a graph if not everybody may
@@ -175,10 +180,6 @@ class Notifications:
             log.exception("it is not known who may see the graph of %s", message.id)
             seen = False
         return message if seen else message.unnamed
-
-    async def _switch_off(self, receiver: Receiver, why: str, now: int) -> None:
-        log.error("nothing is sent to %s any more: %s", receiver.name, why)
-        await self._until_stored(self.outbox.switch_off, receiver, why, now)
 
     async def _until_stored(
         self, store: Callable[P, Awaitable[T]], *args: P.args, **kw: P.kwargs
