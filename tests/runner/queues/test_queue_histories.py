@@ -30,7 +30,7 @@ from action_assistant.runner.queues.entry import (
     TurnRequest,
     request_of,
 )
-from action_assistant.runner.queues.lanes import Entry
+from action_assistant.runner.queues.robot_queue import Entry
 from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.history import whole_of
@@ -160,7 +160,7 @@ class History:
             await anyio.sleep(60)
             after = [len(each.starts) for each in self.robots.values()]
             assert before == after, "a restart started something"
-            assert not any(each.is_open for each in queues.lanes)
+            assert not any(each.is_open for each in queues.robot_queues)
         self.hold()
 
     async def _calm(self) -> None:
@@ -228,9 +228,9 @@ class History:
 
     def _hold_closed(self, queues: Queues, robots: tuple[str, ...]) -> None:
         """Check in the step of a Stop that no queue of its robots is open."""
-        for lane in queues.lanes:
-            if lane.name in robots and lane.is_open:
-                self.faults.append(f"a Stop left the queue of {lane.name} open")
+        for queue in queues.robot_queues:
+            if queue.name in robots and queue.is_open:
+                self.faults.append(f"a Stop left the queue of {queue.name} open")
 
     async def _do(
         self, step: str, control: ExecutionService, queues: Queues, people: TaskGroup
@@ -262,11 +262,11 @@ class History:
             case "stop run":
                 await self._stop_run(control, queues)
             case "reopen":
-                for lane in queues.lanes:
-                    if lane.closed is not None and lane in queues.lanes:
+                for queue in queues.robot_queues:
+                    if queue.closed is not None and queue in queues.robot_queues:
                         with suppress(Refused):
-                            await reopened(queues, lane.name)
-                            self.reopened.add(id(lane))
+                            await reopened(queues, queue.name)
+                            self.reopened.add(id(queue))
             case "lost":
                 self.robots[robot].engine = self.robots[robot].new_engine()
             case "baton":
@@ -284,8 +284,8 @@ class History:
                         await queues.move(one.id, MoveRequest(before.id), author(ANN), ANN)
                     else:
                         await queues.remove(one.id, author(ANN), ANN)
-            case "close" if queues.lanes:
-                queues.close(chance.choice(queues.lanes).name, author(BEN))
+            case "close" if queues.robot_queues:
+                queues.close(chance.choice(queues.robot_queues).name, author(BEN))
             case "rest":
                 await self._rest(control)
             case "hold" | "step" | "go on" | "answer":
@@ -319,14 +319,14 @@ class History:
 
     def _check(self, queues: Queues) -> None:
         """A closed queue is opened by a person alone, and nothing of it is ready."""
-        for lane in queues.lanes:
-            if lane.is_open and id(lane) in self.closed - self.reopened:
-                self.faults.append(f"the queue of {lane.name} opened by itself")
-            (self.closed.discard if lane.is_open else self.closed.add)(id(lane))
-            if not lane.is_open:
-                self.reopened.discard(id(lane))
+        for queue in queues.robot_queues:
+            if queue.is_open and id(queue) in self.closed - self.reopened:
+                self.faults.append(f"the queue of {queue.name} opened by itself")
+            (self.closed.discard if queue.is_open else self.closed.add)(id(queue))
+            if not queue.is_open:
+                self.reopened.discard(id(queue))
                 for entry in queues.entries:
-                    if lane.name in entry.lanes and entry.ready_at is not None:
+                    if queue.name in entry.queue_names and entry.ready_at is not None:
                         self.faults.append("an entry of a closed queue is ready")
 
     def hold(self) -> None:

@@ -23,7 +23,7 @@ from action_assistant.runner.queues.entry import (
     TurnRequest,
     stream_of,
 )
-from action_assistant.runner.queues.lanes import Entry, Lane
+from action_assistant.runner.queues.robot_queue import Entry, RobotQueue
 from action_assistant.runner.queues.service import Queues, closing_of
 from action_assistant.runner.queues.views import queue_view
 from action_assistant.runner.robots.rights import Operator, Rules
@@ -103,18 +103,18 @@ async def started(queues: Queues, entry: Entry, by: Identity = ANN) -> str:
     return (await queues.start(entry.id, asked, author(by), by)).run.id
 
 
-def lane(queues: Queues, robot: str) -> Lane:
-    return next(each for each in queues.lanes if each.name == robot)
+def queue_of(queues: Queues, robot: str) -> RobotQueue:
+    return next(each for each in queues.robot_queues if each.name == robot)
 
 
 async def reopened(queues: Queues, robot: str, by: Identity = BEN) -> None:
-    closed = lane(queues, robot).closed
+    closed = queue_of(queues, robot).closed
     assert closed is not None
     await queues.open(robot, OpenQueueRequest(closing_of(closed)), author(by), by)
 
 
 def why_closed(queues: Queues, robot: str) -> str:
-    closed = lane(queues, robot).closed
+    closed = queue_of(queues, robot).closed
     return "" if closed is None else closed.why
 
 
@@ -307,7 +307,7 @@ async def test_every_kind_of_stop_closes_the_queues_of_its_robots_alone() -> Non
                 if is_over:
                     await over(control, run)
                 await stop(control, run)
-                closed = lane(queues, "David").closed
+                closed = queue_of(queues, "David").closed
                 assert closed is not None
                 assert (closed.why, closed.by) == ("stop", author(BEN))
                 assert bool(why_closed(queues, "Carol")) == (stop is stop_all)
@@ -366,7 +366,7 @@ async def test_a_start_that_was_pressed_before_a_stop_does_not_leave_when_the_qu
             await anyio.sleep(0.5)
             control.stop_robot("David", author(BEN))
             await reopened(queues, "David")
-            assert lane(queues, "David").closed is None
+            assert queue_of(queues, "David").closed is None
         assert found == ["Its queue was closed since, or a robot was not free. Look again."]
         await anyio.sleep(60)
         assert lab.david.starts == []
@@ -557,7 +557,7 @@ async def test_why_a_queue_is_closed_quotes_no_run_and_no_refusal_to_who_may_not
         await put(queues, on("David"))
         unseen = Unseen(BEN.person.id, frozenset({"hidden"}))
         for doubt in (Doubt("refused", "Pick secret."), Doubt("lost", "Pick secret.", run="r")):
-            queues._doubts.meet(lane(queues, "David"), doubt)
+            queues._doubts.meet(queue_of(queues, "David"), doubt)
             for reader in (None, unseen):
                 shown = queue_view(queues, lambda _: None, reader)
                 text = msgspec.json.encode(shown).decode()

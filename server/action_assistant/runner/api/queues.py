@@ -19,7 +19,7 @@ from action_assistant.runner.queues.entry import (
     QueueRequest,
     TurnRequest,
 )
-from action_assistant.runner.queues.lanes import Entry
+from action_assistant.runner.queues.robot_queue import Entry
 from action_assistant.runner.queues.views import LookShown, QueueShown, look_view, queue_view
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.run import Run

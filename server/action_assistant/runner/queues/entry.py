@@ -297,7 +297,7 @@ def _require_none(blocked: Sequence[Item]) -> None:
         raise Conflict(text, where={"path": "/start", "item": blocked[0].code})
 
 
-def lanes_of(robots: Sequence[str]) -> tuple[str, ...]:
+def queue_names_of(robots: Sequence[str]) -> tuple[str, ...]:
     """Return the names of the queues in which a start for these robots waits."""
     return tuple(robots) or (SIMULATOR,)
 

@@ -43,10 +43,10 @@ from action_assistant.runner.queues.entry import (
     differences,
     digest_of,
     entry_id,
-    lanes_of,
     looked_of,
     named,
     order_of,
+    queue_names_of,
     request_of,
     require_openable,
     require_queueable,
@@ -54,7 +54,7 @@ from action_assistant.runner.queues.entry import (
     stream_of,
     stream_of_robot,
 )
-from action_assistant.runner.queues.lanes import Entry, Lane, Look
+from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.doubts import Doubt
 from action_assistant.runner.runs.events import Author, StoredKind, draft_of
@@ -94,12 +94,12 @@ class Queues:
         self._tasks = tasks
         self._run_in_worker = run_in_worker
         self._entries: list[Entry] = []
-        self._lanes: dict[str, Lane] = {}
+        self._queues: dict[str, RobotQueue] = {}
         self._going: set[str] = set()  # runs that are not over
         self._robots_of: LruCache[str, frozenset[str]] = LruCache(_REMEMBERED)
         self._entering = anyio.Lock()
         self._watchers: list[Callable[[], None]] = []
-        self._doubts = DoubtWatch[Lane](control, self._lanes.values, self._close)
+        self._doubts = DoubtWatch[RobotQueue](control, self._queues.values, self._close)
         control.watch(self._run_changed)
         control.watch_robots(self._survey)
 
@@ -122,7 +122,7 @@ class Queues:
                 yield queues
             finally:
                 queues._entries.clear()
-                queues._lanes.clear()  # runs change further, while nobody stores what that closes
+                queues._queues.clear()  # runs change further, while nobody stores what that closes
                 tasks.cancel_scope.cancel()
 
     def watch(self, watcher: Callable[[], None]) -> None:
@@ -141,10 +141,10 @@ class Queues:
         return tuple(self._entries)
 
     @property
-    def lanes(self) -> tuple[Lane, ...]:
+    def robot_queues(self) -> tuple[RobotQueue, ...]:
         """The queues in which something waits, by name."""
-        used = {name for each in self._entries for name in each.lanes}
-        return tuple(self._lanes[name] for name in sorted(used))
+        used = {name for each in self._entries for name in each.queue_names}
+        return tuple(self._queues[name] for name in sorted(used))
 
     def find(self, id_: str) -> Entry:
         """Return an entry that waits. Raise NotFound if there is none with this id."""
@@ -187,9 +187,9 @@ class Queues:
         start, robots = request.start, engines_of(request.start)
         graphs = (start.graph, *(each.graph for each in start.subgraphs))
         self._control.sight.require_graphs(identity, *graphs)
-        lanes = [self._lane(name) for name in lanes_of(robots)]
-        for lane in lanes:
-            lane.entering += 1  # a Stop from here on closes it
+        own_queues = [self._queue_of(name) for name in queue_names_of(robots)]
+        for queue in own_queues:
+            queue.entering += 1  # a Stop from here on closes it
         try:
             known = await self._known(request, author)
             if known is not None:
@@ -220,8 +220,8 @@ class Queues:
             )
             return await self._enter(entered, request, identity)
         finally:
-            for lane in lanes:
-                lane.entering -= 1
+            for queue in own_queues:
+                queue.entering -= 1
             self._drop_empty()
 
     async def _enter(
@@ -299,7 +299,7 @@ class Queues:
             passed = others[place : self._entries.index(entry)]
             strangers = (each for each in passed if each.entered.author.id != author.id)
             for each in strangers:
-                if not set(each.lanes).isdisjoint(entry.lanes):
+                if not set(each.queue_names).isdisjoint(entry.queue_names):
                     who = each.entered.author.name or "somebody"
                     raise Forbidden(f"That would go before the start of {who}: an owner may do it.")
         order = [*others[:place], entry, *others[place:]]
@@ -344,14 +344,16 @@ class Queues:
         if not self._entries:
             return
         ahead: dict[str, int] = {}
-        busy = {lane: tuple(self._busy(lane)) for lane in self._lanes}
+        busy = {name: tuple(self._busy(name)) for name in self._queues}
         is_changed = False
         for entry in tuple(self._entries):
             closed = [
-                Waiting(name, "closed") for name in entry.lanes if not self._lanes[name].is_open
+                Waiting(name, "closed")
+                for name in entry.queue_names
+                if not self._queues[name].is_open
             ]
             waits = list(closed)
-            for name in entry.lanes:
+            for name in entry.queue_names:
                 if not closed:
                     if behind := ahead.get(name, 0):
                         waits.append(Waiting(name, "behind", behind=behind))
@@ -371,8 +373,8 @@ class Queues:
     def _busy(self, name: str) -> Iterator[Waiting]:
         """Yield why a robot is not free, whatever waits for it."""
         if name == SIMULATOR:
-            lane = self._lanes[name]
-            for run in sorted(filter(lane.owns, self._going))[:1]:
+            queue = self._queues[name]
+            for run in sorted(filter(queue.owns, self._going))[:1]:
                 yield Waiting(name, "run", run)
             return
         occupying = self._control.occupying(name)
@@ -433,8 +435,10 @@ class Queues:
                     raise Forbidden(denied.reason)
                 await self._start(entry, start, ready_at, author, identity)
             except Refused as refused:
-                for lane in [self._lanes[name] for name in entry.lanes if name in self._lanes]:
-                    self._doubts.meet(lane, Doubt("refused", refused.detail))
+                for queue in [
+                    self._queues[name] for name in entry.queue_names if name in self._queues
+                ]:
+                    self._doubts.meet(queue, Doubt("refused", refused.detail))
 
     # --- start --------------------------------------------------------------------------------
 
@@ -476,7 +480,7 @@ class Queues:
         """Return since when it is the turn of an entry, µs UTC. Raise Conflict if it has to wait."""
         self._survey()
         for each in entry.waits:
-            closed = self._lanes[each.robot].closed if each.why == "closed" else None
+            closed = self._queues[each.robot].closed if each.why == "closed" else None
             where: dict[str, object] = {"robot": each.robot, "why": each.why}
             if closed is not None:
                 text = f"The queue of {named(each.robot)} is closed. {closed.text}"
@@ -501,7 +505,7 @@ class Queues:
         """Take out an entry that has become a run, in this step, and store that."""
         if entry not in self._entries:
             return
-        self._robots_of.put(run.id, frozenset(entry.lanes))
+        self._robots_of.put(run.id, frozenset(entry.queue_names))
         event = QueueLeft(at=self._clock_us(), run=run.id)
         self._tasks.start_soon(self._store, stream_of(entry.id), event)
         self._forget(entry)
@@ -516,20 +520,20 @@ class Queues:
 
     # --- close and open -----------------------------------------------------------------------
 
-    def _lane(self, name: str) -> Lane:
+    def _queue_of(self, name: str) -> RobotQueue:
         """Return the queue of a robot. One in which nothing waited is open: whoever puts the first start
         into it has looked."""
-        lane = self._lanes.get(name)
-        if lane is None:
-            lane = self._lanes[name] = Lane(name, self._robots_of)
-            self._doubts.begin(lane)
-        return lane
+        queue = self._queues.get(name)
+        if queue is None:
+            queue = self._queues[name] = RobotQueue(name, self._robots_of)
+            self._doubts.begin(queue)
+        return queue
 
     def _drop_empty(self) -> None:
-        used = {name for each in self._entries for name in each.lanes}
-        for name, lane in tuple(self._lanes.items()):
-            if name not in used and not lane.entering:
-                del self._lanes[name]
+        used = {name for each in self._entries for name in each.queue_names}
+        for name, queue in tuple(self._queues.items()):
+            if name not in used and not queue.entering:
+                del self._queues[name]
 
     def close(self, robot: str, author: Author) -> None:
         """Close the queue of a robot in the name of a person; no run is stopped by it. Raise NotFound if
@@ -537,22 +541,22 @@ class Queues:
         who = author.name or "Somebody"
         self._doubts.meet(self._of(robot), Doubt("person", f"{who} closed the queue.", author))
 
-    def _of(self, robot: str) -> Lane:
-        lane = next((each for each in self.lanes if each.name == robot), None)
-        if lane is None:
+    def _of(self, robot: str) -> RobotQueue:
+        queue = next((each for each in self.robot_queues if each.name == robot), None)
+        if queue is None:
             raise NotFound(f"Nothing waits for {named(robot)}.")
-        return lane
+        return queue
 
-    def _close(self, lane: Lane, doubt: Doubt) -> None:
-        lane.is_open = False
+    def _close(self, queue: RobotQueue, doubt: Doubt) -> None:
+        queue.is_open = False
         event = QueueClosed(
             at=self._clock_us(), why=doubt.why, text=doubt.text, by=doubt.by, run=doubt.run
         )
-        lane.closed = event
+        queue.closed = event
         by = doubt.by.id if doubt.by is not None else ""
-        self._tasks.start_soon(self._store, stream_of_robot(lane.name), event, by)
+        self._tasks.start_soon(self._store, stream_of_robot(queue.name), event, by)
         for entry in self._entries:
-            if doubt.by is not None and lane.name in entry.lanes and entry.turn.locked():
+            if doubt.by is not None and queue.name in entry.queue_names and entry.turn.locked():
                 self._control.hold_back(request_of(entry.id), doubt.by)
         self._survey()
         self._changed()
@@ -564,32 +568,32 @@ class Queues:
         nothing there. On robots nothing is started. Raise NotFound if nothing waits for it, Conflict if
         it was closed again since the person looked, or something is in doubt, Unavailable if it cannot
         be stored."""
-        lane = self._of(robot)
-        if lane.closed is None:
+        queue = self._of(robot)
+        if queue.closed is None:
             raise Conflict(f"The queue of {named(robot)} is open.")
-        closed, before = lane.closed, lane.doubts
+        closed, before = queue.closed, queue.doubts
         if asked.closing != closing_of(closed):
             where: dict[str, object] = {"path": "/closing", "closing": closing_of(closed)}
             raise Conflict(f"It was closed again meanwhile. {closed.text}", where=where)
         self._require_settled(robot)
-        standing = self._doubts.standing(lane)
-        entry = self._first_seen(lane, identity)
+        standing = self._doubts.standing(queue)
+        entry = self._first_seen(queue, identity)
         start = await self._start_in(entry, {})
         look, _ = await self._look(start, entry.entered.seen, identity)
         require_openable(start, look.looks, robot)
         event = QueueOpened(at=self._clock_us(), author=author)
         with anyio.CancelScope(shield=True):
             await self._journal.append(stream_of_robot(robot), [draft_of(event, author.id)])
-            is_other = lane.doubts != before or self._doubts.standing(lane) != standing
-            if lane.closed is not closed or is_other or self._lanes.get(robot) != lane:
-                if lane.closed is not None:
-                    self._tasks.start_soon(self._store, stream_of_robot(robot), lane.closed)
+            is_other = queue.doubts != before or self._doubts.standing(queue) != standing
+            if queue.closed is not closed or is_other or self._queues.get(robot) != queue:
+                if queue.closed is not None:
+                    self._tasks.start_soon(self._store, stream_of_robot(robot), queue.closed)
                 raise Conflict("It was opened or closed meanwhile. Look again.")
-            lane.closed = None
-            self._doubts.begin(lane)
+            queue.closed = None
+            self._doubts.begin(queue)
             if robot == SIMULATOR:
                 for each in self._entries:
-                    if each.by is None and robot in each.lanes:
+                    if each.by is None and robot in each.queue_names:
                         each.by = (author, identity)
             self._survey()
             self._changed()
@@ -601,11 +605,13 @@ class Queues:
             text = f"Run {run.number} on {robot} is not known to be at rest."
             raise Conflict(text, where={"run": run.id})
 
-    def _first_seen(self, lane: Lane, identity: Identity) -> Entry:
+    def _first_seen(self, queue: RobotQueue, identity: Identity) -> Entry:
         """Return the first entry of a queue that a person may see. Raise Forbidden if there is none."""
         unseen = self._control.sight.unseen(identity)
         for entry in self._entries:
-            if lane.name in entry.lanes and (unseen is None or not unseen.hides(entry.graphs)):
+            if queue.name in entry.queue_names and (
+                unseen is None or not unseen.hides(entry.graphs)
+            ):
                 return entry
         raise Forbidden(
             "You may see no graph that waits there, so you cannot look before the start."
@@ -656,9 +662,9 @@ class Queues:
                 continue
             ranks = {each: rank for rank, each in enumerate(order)}
             self._entries.sort(key=lambda each: ranks.get(each.id, len(ranks)))
-        names = {name for each in self._entries for name in each.lanes}
-        for lane in [self._lane(name) for name in sorted(names)]:
-            self._doubts.meet(lane, Doubt("restart", _RESTARTED))
+        names = {name for each in self._entries for name in each.queue_names}
+        for queue in [self._queue_of(name) for name in sorted(names)]:
+            self._doubts.meet(queue, Doubt("restart", _RESTARTED))
 
 
 def closing_of(closed: QueueClosed) -> str:

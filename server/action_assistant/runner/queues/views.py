@@ -8,7 +8,7 @@ import msgspec
 
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.queues.entry import QueueClosed, Wait, Waiting, named
-from action_assistant.runner.queues.lanes import Entry, Lane, Look
+from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
 from action_assistant.runner.queues.service import Queues, closing_of
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
@@ -111,22 +111,22 @@ def queue_view(
 ) -> QueueShown:
     """Return the queue. `run_of`: returns an open run; `unseen`: the graphs that the reader may not
     see."""
-    lanes = {each.name: each for each in queues.lanes}
-    entries = [_entry(each, lanes, run_of, unseen) for each in queues.entries]
+    robot_queues = {each.name: each for each in queues.robot_queues}
+    entries = [_entry(each, robot_queues, run_of, unseen) for each in queues.entries]
     robots = [
         RobotQueueShown(
             robot=name,
-            entries=[each.id for each in queues.entries if name in each.lanes],
-            closed=_closed(lane, unseen),
+            entries=[each.id for each in queues.entries if name in each.queue_names],
+            closed=_closed(queue, unseen),
         )
-        for name, lane in lanes.items()
+        for name, queue in robot_queues.items()
     ]
     return QueueShown(entries=entries, robots=robots)
 
 
 def _entry(
     entry: Entry,
-    lanes: dict[str, Lane],
+    robot_queues: dict[str, RobotQueue],
     run_of: Callable[[str], Run | None],
     unseen: Unseen | None,
 ) -> EntryShown:
@@ -155,7 +155,7 @@ def _entry(
         entered_at=time(entered.at),
         by_itself=entered.by_itself,
         state=state,
-        waits=[_waiting(each, lanes, run_of, unseen) for each in entry.waits],
+        waits=[_waiting(each, robot_queues, run_of, unseen) for each in entry.waits],
         ready_at=None if entry.ready_at is None else time(entry.ready_at),
         hidden=is_hidden,
     )
@@ -163,7 +163,7 @@ def _entry(
 
 def _waiting(
     wait: Waiting,
-    lanes: dict[str, Lane],
+    robot_queues: dict[str, RobotQueue],
     run_of: Callable[[str], Run | None],
     unseen: Unseen | None,
 ) -> WaitingShown:
@@ -171,7 +171,7 @@ def _waiting(
     name = named(robot)
     match wait.why:
         case "closed":
-            closed = lanes[robot].closed
+            closed = robot_queues[robot].closed
             text = (
                 f"The queue of {name} is closed. {'' if closed is None else _why(closed, unseen)}"
             )
@@ -212,8 +212,8 @@ def _why(closed: QueueClosed, unseen: Unseen | None) -> str:
     return closed.text
 
 
-def _closed(lane: Lane, unseen: Unseen | None) -> QueueClosedShown | None:
-    closed = lane.closed
+def _closed(queue: RobotQueue, unseen: Unseen | None) -> QueueClosedShown | None:
+    closed = queue.closed
     if closed is None:
         return None
     return QueueClosedShown(

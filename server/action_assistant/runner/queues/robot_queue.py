@@ -6,14 +6,14 @@ import msgspec
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.execution.doubts import Closable
 from action_assistant.runner.links.port import SIMULATOR
-from action_assistant.runner.queues.entry import QueueClosed, QueueEntered, Waiting, lanes_of
+from action_assistant.runner.queues.entry import QueueClosed, QueueEntered, Waiting, queue_names_of
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sight import RunGraphs
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.web.auth.identity import Identity
 
 
-class Lane(Closable):
+class RobotQueue(Closable):
     """The queue of one robot, or of the simulator, while something waits in it. `robots_of`: the robots
     of known runs, "simulator" for those that came from its queue; `closed`: why it is closed, None while
     it is open; `entering`: how many starts are being put into it."""
@@ -49,9 +49,9 @@ class Entry:
         return self.entered.entry
 
     @property
-    def lanes(self) -> tuple[str, ...]:
+    def queue_names(self) -> tuple[str, ...]:
         """The names of the queues in which it waits."""
-        return lanes_of(self.entered.robots)
+        return queue_names_of(self.entered.robots)
 
     @property
     def graphs(self) -> RunGraphs:
