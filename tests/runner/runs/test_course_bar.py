@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from action_assistant.runner.analysis import annotations
-from action_assistant.runner.runs.course_bar import CoursePart, course_bar
+from action_assistant.runner.runs.course_bar import CoursePart, course_bar, stored_course
 from action_assistant.runner.runs.events import Ended, Published
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
@@ -56,3 +56,11 @@ def test_a_time_whose_visits_are_not_listed_any_more_is_no_time_without_any() ->
 def test_the_sum_of_a_run_keeps_its_course() -> None:
     run = over({"Work_0": ActionRun(visits=(visit(0, 60, "true"),))})
     assert annotations.sum_of(run, None, 0).course == (CoursePart("true", 60),)
+
+
+@pytest.mark.parametrize(
+    "value", [[{"shows": "paused", "steps": 60}], [{"steps": 3}], "none", None]
+)
+def test_a_course_of_an_unknown_form_hides_no_list_of_runs(value: object) -> None:
+    assert stored_course(value) == ()
+    assert stored_course([{"shows": "true", "steps": 60}]) == (CoursePart("true", 60),)

@@ -46,6 +46,15 @@ def course_bar(run: Run) -> tuple[CoursePart, ...]:
     )
 
 
+def stored_course(value: object) -> tuple[CoursePart, ...]:
+    """Return a course as a summary keeps it; () for one of an unknown form, as a newer version of the
+    program may have stored it."""
+    try:
+        return msgspec.convert(value, tuple[CoursePart, ...])
+    except msgspec.ValidationError:
+        return ()
+
+
 def _spans(run: Run, begin: int, end: int) -> Iterator[tuple[int, int, Shown]]:
     """Return begin and end of all visits, and of the times whose visits are not listed any more."""
     for action in run.actions.values():

@@ -10,7 +10,7 @@ from sqlalchemy import Row
 
 from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
-from action_assistant.runner.runs.course_bar import CoursePart
+from action_assistant.runner.runs.course_bar import CoursePart, stored_course
 from action_assistant.runner.runs.durations import DurationBounds, of_run
 from action_assistant.runner.runs.earlier_views import (
     EarlierShown,
@@ -521,7 +521,7 @@ def list_entry(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
         note=row.note or "",
         labels=labels,
         archived=archived(row),
-        course=msgspec.convert(row.summary.get("course", ()), tuple[CoursePart, ...]),
+        course=stored_course(row.summary.get("course", ())),
     )
 
 
