@@ -5,6 +5,7 @@ import { relative, resolve } from "node:path";
 import { promisify } from "node:util";
 import { brotliCompress, constants } from "node:zlib";
 import react from "@vitejs/plugin-react";
+import subsetFont from "subset-font";
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
@@ -19,7 +20,10 @@ const chunks: { name: string; test: RegExp; tags?: "$initial"[]; minShareCount?:
     name: "react",
     test: /node_modules\/(react|react-dom|scheduler|use-sync-external-store)\//,
   },
-  { name: "canvas", test: /node_modules\/(@xyflow|d3-|classcat|zustand|yjs|y-protocols|lib0)/ },
+  {
+    name: "canvas",
+    test: /node_modules\/(@xyflow(?!.*\.css)|d3-|classcat|zustand|yjs|y-protocols|lib0)/,
+  },
   // STOP needs nothing but this and React: see `app/stop-main.ts`.
   {
     name: "stop",
@@ -133,6 +137,52 @@ function pageVersion(): Plugin {
   };
 }
 
+/** What the page shows of a font: its weights, distances between letters, and figures of one width. */
+const USED = {
+  variationAxes: { wght: { min: 400, max: 700 } },
+  keepFeatures: ["kern", "locl", "tnum"],
+};
+
+/** Return all characters of a list of ranges such as `U+0000-00FF,U+0131`. */
+function charactersIn(ranges: string): string {
+  return ranges
+    .split(",")
+    .map((range) => {
+      const [first = 0, last = first] = range
+        .slice("U+".length)
+        .split("-")
+        .map((digits) => Number.parseInt(digits, 16));
+      return String.fromCodePoint(...Array.from({ length: last - first + 1 }, (_, n) => first + n));
+    })
+    .join("");
+}
+
+/**
+ * Takes out of the fonts of each first visit the weights and features that the page never shows: among them
+ * ligatures, which show `->` as another sign than was typed.
+ */
+function narrowFonts(): Plugin {
+  return {
+    name: "narrow-fonts",
+    apply: "build",
+    async generateBundle(_, bundle) {
+      for (const part of Object.values(bundle)) {
+        if (part.type !== "asset" || !OFTEN.test(part.fileName)) continue;
+        const name = /(inter|jetbrains-mono)-latin/.exec(part.fileName)?.[1];
+        const list = `node_modules/@fontsource-variable/${name}/unicode.json`;
+        const ranges: unknown = JSON.parse(
+          readFileSync(resolve(import.meta.dirname, list), "utf8"),
+        );
+        const { latin } = ranges as { latin: string };
+        part.source = await subsetFont(Buffer.from(part.source), charactersIn(latin), {
+          targetFormat: "woff2",
+          ...USED,
+        });
+      }
+    },
+  };
+}
+
 const brotli = promisify(brotliCompress);
 
 /** Writes a compressed copy beside each script and stylesheet: that takes too long for a server, and saves a seventh. */
@@ -236,7 +286,15 @@ function className(name: string, file: string): string {
 }
 
 export default defineConfig({
-  plugins: [react(), applyUtilities(), mantineStyles(), pageScript(), pageVersion(), compressed()],
+  plugins: [
+    react(),
+    applyUtilities(),
+    mantineStyles(),
+    narrowFonts(),
+    pageScript(),
+    pageVersion(),
+    compressed(),
+  ],
   // The server writes the path at which a proxy shows the page into index.html.
   base: "./",
   css: { modules: { generateScopedName: className } },
