@@ -30,6 +30,7 @@ from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.auth.identity import Identity
+from action_assistant.web.http.compression import COMPRESSED
 from action_assistant.web.server.application import BODY_LIMIT
 from action_assistant.web.server.openapi import MOST_NUMBER, answer, reads
 
@@ -300,6 +301,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="A graph as UMRF, now or after its change `at`; `identities`: with those of its actions",
         operation_id="getUmrf",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
         responses={200: answer(UmrfGraph)},
     )
     async def get_umrf(
@@ -317,6 +319,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="What is wrong with a graph, now or after its change `seq`",
         operation_id="getProblems",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_problems(graph_id: str, seq: SeqOrNone = None) -> Problems:
         services = app_state.services

@@ -20,6 +20,7 @@ from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.umrf.difference import Difference
 from action_assistant.web.auth.access import Needs, identity_of, person_of
+from action_assistant.web.http.compression import COMPRESSED
 from action_assistant.web.server.openapi import MOST_NUMBER, answer
 
 Asking = Request[Any, Any, Any]
@@ -69,6 +70,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="What was done to a graph, newest first",
         operation_id="getHistory",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_history(
         graph_id: str,
@@ -87,6 +89,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The document of a graph as it was after its change `at`",
         operation_id="getDocument",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
         responses={200: answer(PastDocument)},
     )
     async def get_document(graph_id: str, at: Seq) -> Response[bytes]:
@@ -102,6 +105,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         "the steps between two documents",
         operation_id="getChanges",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_changes(
         graph_id: str,
@@ -120,6 +124,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="What differs between two changes of a graph; `to` is now when left out",
         operation_id="getDifference",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_difference(
         graph_id: str,
@@ -144,6 +149,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Who gave each field of an action, arrow or note the value that it has, and when",
         operation_id="getBlame",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_blame(graph_id: str, of: str, at: SeqOrNone = None) -> list[FieldBlame]:
         services = app_state.services
@@ -155,6 +161,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="All values that a field of an action, arrow or note has had, newest first",
         operation_id="getValues",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_values(
         graph_id: str, of: str, field: str, at: SeqOrNone = None

@@ -28,6 +28,7 @@ from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.model import Key, Position
 from action_assistant.web.auth.access import Needs, identity_of, person_of
+from action_assistant.web.http.compression import COMPRESSED
 
 
 class Extracting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -201,6 +202,7 @@ def _flat(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="A graph and those inside of it as one graph that does the same, or why there is none",
         operation_id="getFlatGraph",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_flat(graph_id: str, at: SeqOrNone = None) -> FlatGraph:
         services = app_state.services

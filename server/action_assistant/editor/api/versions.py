@@ -13,6 +13,7 @@ from action_assistant.editor.services import EditorState
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.graph_seals import Sight
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.http.compression import COMPRESSED
 from action_assistant.web.server.openapi import FileBytes, answer
 
 
@@ -33,6 +34,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The versions of a graph, newest first, without their UMRF",
         operation_id="listVersions",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def list_versions(graph_id: str) -> list[VersionView]:
         services = app_state.services
@@ -67,6 +69,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The graphs inside of a graph, as they are now, at all levels",
         operation_id="getSubgraphs",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_subgraphs(graph_id: str, at: SeqOrNone = None) -> InsideView:
         services = app_state.services
@@ -100,6 +103,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="One version with its UMRF",
         operation_id="getVersion",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def get_version(version_id: str) -> VersionView:
         return await app_state.services.versions.get(version_id)

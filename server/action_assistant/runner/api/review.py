@@ -33,6 +33,7 @@ from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.access import Needs
+from action_assistant.web.http.compression import COMPRESSED
 from action_assistant.web.server.openapi import MOST_NUMBER, FileBytes, answer, reads
 
 T = TypeVar("T")
@@ -97,6 +98,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         summary="The changes of a run by each event, page by page",
         operation_id="getReplay",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def film(
         run: str, after: Annotated[int, Parameter(ge=0, le=MOST_NUMBER)] = 0
@@ -117,6 +119,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         summary="The graph of a run as it was sent",
         operation_id="getRunUmrf",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
         responses={200: answer(UmrfGraph)},
     )
     async def umrf(run: str) -> Response[bytes]:

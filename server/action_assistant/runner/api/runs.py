@@ -86,6 +86,7 @@ from action_assistant.web.auth.access import (
 )
 from action_assistant.web.auth.caller import client_network
 from action_assistant.web.auth.graph_seals import Statement
+from action_assistant.web.http.compression import COMPRESSED
 from action_assistant.web.server.openapi import MOST_NUMBER, answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
@@ -322,6 +323,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         summary="A run, and the graph as it was sent",
         operation_id="getRun",
         guards=[Needs("see")],
+        middleware=[COMPRESSED],
     )
     async def one(run: str, request: _Asking) -> Response[views.RunWhole]:
         is_all = not await is_hidden(services, request, run)
