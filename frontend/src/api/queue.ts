@@ -19,13 +19,33 @@ function useChanges(value: object | undefined): number {
   return count.current;
 }
 
+const LOOK_AGAIN = 5_000; // ms
+
+/**
+ * Query what a look before the start of an entry finds, again and again once a person has asked for it:
+ * a baton or a yes may come. `refetch` asks for it.
+ */
+export function useEntryLook(entry: string, watching: Watching, asked: boolean) {
+  const { runner } = useLive();
+  return useQuery({
+    queryKey: ["queue-look", entry, watching],
+    queryFn: () => lookAtEntry(runner ?? "", entry, watching),
+    enabled: asked && runner !== undefined,
+    refetchInterval: LOOK_AGAIN,
+    placeholderData: keepPreviousData,
+    gcTime: 0,
+    staleTime: 0,
+    retry: false,
+  });
+}
+
 /** Query the queue; anew whenever the runner says that it has changed. */
-export function useQueue() {
+export function useQueue(enabled = true) {
   const { runner, now } = useLive();
   return useQuery({
     queryKey: ["queue", useChanges(now.queue)],
     queryFn: ({ signal }) => runnerAt(runner).get("/api/queue", { signal }),
-    enabled: runner !== undefined,
+    enabled: enabled && runner !== undefined,
     placeholderData: keepPreviousData,
     gcTime: 0, // a page that comes again begins to count anew, and must not be shown an old queue
   });
@@ -39,11 +59,13 @@ export async function enterQueue(order: StartOrder): Promise<Queue> {
   return runnerAt(order.runner).post("/api/queue", { body });
 }
 
-/** Query what a look before the start of an entry finds now. */
-export function lookAtEntry(runner: string, entry: string, watching: Watching): Promise<QueueLook> {
+function lookAtEntry(runner: string, entry: string, watching: Watching): Promise<QueueLook> {
   const path = { entry };
   return runnerAt(runner).post("/api/queue/{entry}/look", { path, body: { watching } });
 }
+
+/** Return the request id of the one start of an entry. */
+export const requestOfEntry = (entry: string): string => `queue/${entry}`;
 
 /** Start an entry at its turn, exactly as it was looked at. */
 export function startEntry(

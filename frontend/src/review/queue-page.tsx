@@ -1,38 +1,30 @@
 /** The queue: which starts wait for which robots, why and in which order; at its turn a person looks and starts one. */
 import { Button, Skeleton } from "@mantine/core";
-import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconHourglassEmpty } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
-import { Link, useLocation } from "wouter";
-import { errorText, isOutcomeUnknown } from "../api/http";
+import { Link } from "wouter";
+import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
 import {
   closeQueue,
-  lookAtEntry,
   moveEntry,
   openQueue,
   type Queue,
   type QueueEntry,
-  type QueueLook,
   type RobotQueue,
   removeEntry,
-  startEntry,
   useQueue,
 } from "../api/queue";
 import { lineWords, valueLines } from "../status/value-words";
-import { useWatching, WatchTicks } from "../status/watching";
 import { Empty } from "../ui/empty";
-import { HoldButton } from "../ui/hold-button";
 import { clock, day, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./queue-page.module.css";
+import { Fault, named, Turn } from "./queue-turn";
 import type { RunBarParts } from "./run-page";
-
-const named = ({ robots }: QueueEntry): string =>
-  robots.length === 0 ? "in the simulator" : `on ${robots.map(isolated).join(", ")}`;
 
 const robotWords = (robot: string): string =>
   robot === "simulator" ? "the simulator" : isolated(robot);
@@ -48,15 +40,6 @@ function useCommand<T>(command: (runner: string) => Promise<T>) {
     },
     onSettled: () => client.invalidateQueries({ queryKey: ["queue"] }),
   });
-}
-
-function Fault({ error }: { error: Error | null }) {
-  if (error === null) return null;
-  return (
-    <p role="alert" className={style.error}>
-      {errorText(error)}
-    </p>
-  );
 }
 
 /** The queue of one robot, where it is closed: why, and the button that opens it. */
@@ -100,114 +83,6 @@ function CloseButton({ robot }: { robot: string }) {
       </Button>
       <Fault error={close.error} />
     </>
-  );
-}
-
-/** Items of a look that are worth a line: what is in the way, and what is only noted. */
-function Items({ look }: { look: QueueLook }) {
-  const items = look.looks.flatMap(({ engine, items: each }) =>
-    each.map((item) => ({ engine, ...item })),
-  );
-  const worth = items.filter(({ verdict }) => verdict !== "passed");
-  return (
-    <ul className={style.items}>
-      {worth.map(({ engine, code, verdict, text }) => (
-        <li key={`${engine} ${code} ${text}`} data-verdict={verdict}>
-          {verdict === "blocked" ? "In the way: " : "Note: "}
-          {text}
-        </li>
-      ))}
-      <li className="ink2">{counted(items.length - worth.length, "check")} passed.</li>
-    </ul>
-  );
-}
-
-/** The look before the start of an entry whose turn it is, and the button that starts it. */
-function Turn({ entry }: { entry: QueueEntry }) {
-  const [, go] = useLocation();
-  const { live } = useLive();
-  const watch = useWatching(entry.robots);
-  const look = useCommand((runner) => lookAtEntry(runner, entry.id, watch.watching));
-  const found = look.data;
-  const start = useMutation({
-    mutationFn: (runner: string) => startEntry(runner, entry.id, found?.look ?? "", watch.watching),
-    onSuccess: (run) => {
-      live?.learn(run);
-      go(`/runs/${run.id}`);
-    },
-    onError: (error) => {
-      if (!isOutcomeUnknown(error)) return;
-      const title = `NOT KNOWN whether ${isolated(entry.graph_name)} started`;
-      const message = `${errorText(error)} Look at the runs. Another press of the same counts once. Stop works.`;
-      notifications.show({ color: "red", autoClose: false, title, message });
-    },
-    onSettled: () => {
-      watch.forget();
-      look.reset();
-    },
-  });
-  const { runner } = useLive();
-  const blocked = (found?.looks ?? []).flatMap(({ items }) =>
-    items.filter(({ verdict, overridable, code }) =>
-      // Whoever has to confirm is asked when they start; what they watch is said beside the button.
-      verdict === "blocked" ? !overridable && code !== "watched" && code !== "confirm" : false,
-    ),
-  );
-  const what = `Start ${isolated(entry.graph_name)} ${named(entry)}`;
-  const why = watch.obstacle ?? (blocked.length > 0 ? "A check prevents the start" : null);
-  const differs = found?.differs ?? entry.differs;
-  const moves = entry.robots.length > 0;
-  const begin = () => runner !== undefined && start.mutate(runner);
-  return (
-    <section
-      className={style.turn}
-      aria-label={`Before the start of ${isolated(entry.graph_name)}`}
-    >
-      {differs.length > 0 && (
-        <div className={style.differs}>
-          <b>It is not as it was when it was put here:</b>
-          <ul>
-            {differs.map((each) => (
-              <li key={each}>{each}</li>
-            ))}
-          </ul>
-        </div>
-      )}
-      {found && <Items look={found} />}
-      {found && <WatchTicks watch={watch} />}
-      <div className={style.buttons}>
-        <Button
-          variant={found ? "subtle" : "filled"}
-          loading={look.isPending}
-          onClick={() => {
-            start.reset();
-            look.mutate();
-          }}
-        >
-          {found ? "Look again" : "Look before the start"}
-        </Button>
-        {found && moves && (
-          <HoldButton
-            label={why ?? "Hold to start"}
-            name={why === null ? what : `${what}: ${why}`}
-            question={`You have looked: ${what}?`}
-            disabled={why !== null || start.isPending}
-            onHeld={begin}
-          />
-        )}
-        {found && !moves && (
-          <Button
-            variant="filled"
-            disabled={why !== null}
-            loading={start.isPending}
-            onClick={begin}
-          >
-            {why ?? what}
-          </Button>
-        )}
-      </div>
-      <Fault error={start.error ?? look.error} />
-    </section>
   );
 }
 
@@ -287,7 +162,8 @@ function Found({ queue: { entries, robots } }: { queue: Queue }) {
   if (entries.length === 0)
     return (
       <Empty icon={<IconHourglassEmpty size={22} />} title="Nothing waits">
-        Where a robot is not free, <b>Wait in the queue</b> stands beside the start.
+        Where a robot is busy or others wait for it, <b>Wait in the queue</b> stands beside the
+        start.
       </Empty>
     );
   return (

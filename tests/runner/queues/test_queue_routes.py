@@ -1,6 +1,7 @@
 """The queue over HTTP: put there, shown by the rights of the reader, looked at and started."""
 
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 import msgspec
@@ -51,6 +52,28 @@ def test_a_person_looks_and_starts_what_waits_in_its_order(process: RunnerProces
         assert removed.json() == {"entries": [], "robots": []}
         assert client.post(f"/api/queue/{second['id']}/look", json={}).status_code == 404
         assert client.post(f"/api/queue/{second['id']}/start", json={"look": ""}).status_code == 404
+
+
+def test_what_a_start_without_an_answer_has_become_is_found_in_the_queue(
+    process: RunnerProcess,
+) -> None:
+    """A page that got no answer asks by the request id, also by that of the start at the turn."""
+    with process.client() as client:
+
+        def found(request_id: str) -> tuple[Any, list[str]]:
+            answer = client.get(f"/api/starts/{quote(request_id, safe='')}").json()
+            assert answer["request_id"] == request_id
+            return answer["queued"], [each["id"] for each in answer["runs"]]
+
+        start = order(sequence("lost"), script=FAST, request_id="lost in the queue")
+        assert found("lost in the queue") == (None, [])
+        wanted = msgspec.json.encode({"start": msgspec.Raw(body(start))})
+        entry = client.post("/api/queue", content=wanted).json()["entries"][0]["id"]
+        assert found("lost in the queue") == ({"entry": entry, "waits": True}, [])
+        look = client.post(f"/api/queue/{entry}/look", json={}).json()["look"]
+        run = client.post(f"/api/queue/{entry}/start", json={"look": look}).json()["id"]
+        assert found("lost in the queue") == ({"entry": entry, "waits": False}, [run])
+        assert found(f"queue/{entry}") == (None, [run])
 
 
 def test_a_stop_closes_the_queue_and_a_person_opens_it_again(process: RunnerProcess) -> None:

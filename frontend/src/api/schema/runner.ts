@@ -1460,12 +1460,13 @@ export interface RunnerApi {
     /**
      * LookShown
      * @description The pre-flight of an entry now. `look`: by which its start says what was looked at; `differs`: as
-     *     of the entry.
+     *     of the entry; `overridden`: the codes of what it is started in spite of.
      */
     LookShown: {
         look: string;
         looks: RunnerApi["Preflight"][];
         differs: string[];
+        overridden: string[];
     };
     /**
      * MarkShown
@@ -1968,6 +1969,14 @@ export interface RunnerApi {
     QueueShown: {
         entries: RunnerApi["EntryShown"][];
         robots: RunnerApi["RobotQueueShown"][];
+    };
+    /**
+     * QueuedStart
+     * @description A start that was put into the queue. `waits`: it is there still; else it was started, or removed.
+     */
+    QueuedStart: {
+        entry: string;
+        waits: boolean;
     };
     /**
      * RawHour
@@ -3098,13 +3107,15 @@ export interface RunnerApi {
     };
     /**
      * StartShown
-     * @description The state of a start. `under_way`: it is being carried out now. If it is false and `runs` is
-     *     empty, the start has not arrived here so far.
+     * @description The state of a start. `under_way`: it is being carried out now; `queued`: the entry of the queue
+     *     that it has become, whose run is one of `runs`. If all of them are empty, the start has not arrived
+     *     here so far.
      */
     StartShown: {
         request_id: string;
         under_way: boolean;
         runs: RunnerApi["RunShown"][];
+        queued: RunnerApi["QueuedStart"] | null;
     };
     /**
      * Statement

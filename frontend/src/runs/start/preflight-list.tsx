@@ -17,10 +17,9 @@ import { CONDUCTED } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { serverPath } from "../../api/page-url";
 import { useMay } from "../../api/people";
-import { useRight } from "../../api/rights";
 import { type Preflight, type PreflightItem, SIMULATOR } from "../../api/robots";
 import { type IndexFolderLook, writeIntoIndex } from "../../api/starts";
-import { TakeBaton } from "../../status/robot-rights";
+import { BatonRemedy } from "../../status/start-remedies";
 import { HoldButton } from "../../ui/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
@@ -112,19 +111,6 @@ function Line({ item, look, moment }: PreflightLineProps) {
 /** Return a key that stays while other items come and go: several items may have one code. */
 function keyOf(items: readonly PreflightItem[], code: string, at: number): string {
   return `${code} ${items.slice(0, at).filter((item) => item.code === code).length}`;
-}
-
-/** Offers the baton of a robot that it would need. */
-function BatonRemedy({ engine, onTaken }: { engine: string; onTaken: () => void }) {
-  const { now } = useLive();
-  const robot = now.engines.find(({ name }) => name === engine);
-  const mayTake = useRight(engine)?.may_take ?? false;
-  if (robot === undefined || !mayTake) return null;
-  return (
-    <span className={style.remedies}>
-      <TakeBaton robot={robot} onTaken={onTaken} />
-    </span>
-  );
 }
 
 interface Props {

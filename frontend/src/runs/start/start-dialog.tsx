@@ -1,12 +1,12 @@
 /** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
 import { Button, Checkbox, Modal, Text, Textarea } from "@mantine/core";
-import { IconPlayerPlayFilled, IconRefresh, IconUserCheck } from "@tabler/icons-react";
+import { IconPlayerPlayFilled, IconRefresh } from "@tabler/icons-react";
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
 import { fetchDocument } from "../../api/history";
-import { errorText, unconfirmed } from "../../api/http";
+import { errorText } from "../../api/http";
 import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
@@ -23,6 +23,7 @@ import { readGraph } from "../../graph/read";
 import { type Beginning, beginningWords } from "../../status/earlier-list";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
+import { askingRobots, ConfirmFirst, SecondPerson } from "../../status/start-remedies";
 import { EngineLabel } from "../../status/state-label";
 import { lineWords, valueLines } from "../../status/value-words";
 import { useWatching, WatchTicks } from "../../status/watching";
@@ -41,9 +42,8 @@ import {
   WayChoice,
 } from "./led-choice";
 import { PreflightList } from "./preflight-list";
-import { mayWait, QueueButton } from "./queue-choice";
+import { QueueOffer } from "./queue-choice";
 import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
-import { SecondPerson } from "./second-person";
 import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";
 import { useStartFrom } from "./start-from";
@@ -277,30 +277,6 @@ function isDrillDue({ items }: Preflight): boolean {
   return items.some(({ code, verdict }) => code === "drill" && verdict === "blocked");
 }
 
-/** Return the robots that ask this person to confirm who they are. */
-function askingRobots(looks: readonly Preflight[] | undefined): string[] {
-  const asks = ({ items }: Preflight) =>
-    items.some(({ code, verdict }) => code === "confirm" && verdict === "blocked");
-  return (looks ?? []).filter(asks).map(({ engine }) => engine);
-}
-
-/** Offers to confirm who one is, before anything is held; the dialog stays as it is. */
-function ConfirmFirst({ looks }: { looks: readonly Preflight[] | undefined }) {
-  const robots = askingRobots(looks);
-  if (robots.length === 0) return null;
-  return (
-    <section className={style.second} aria-label="Confirm that it is you">
-      <Button
-        size="compact-sm"
-        leftSection={<IconUserCheck size={14} aria-hidden />}
-        onClick={() => unconfirmed.set(robots)}
-      >
-        Confirm that it is you …
-      </Button>
-    </section>
-  );
-}
-
 /** Return why nothing can be started now; null when it can. */
 function obstacleOf(
   engines: readonly string[],
@@ -428,8 +404,12 @@ export function StartDialog(props: Props) {
     breakpoints: breakpoints ?? [],
     values: values ?? {},
   };
-  const waits =
-    mayRepeat && repeat === null && mayWait(looks) && (way.missing ?? given.obstacle) === null;
+  const waitObstacle =
+    beginning || said.drill
+      ? "A start like this cannot wait"
+      : asked.length > 1
+        ? "One robot, or a led run, can wait"
+        : (way.missing ?? given.obstacle ?? (look.isPlaceholderData ? "Looking …" : null));
   const begin = () => {
     rememberEngines(graph, asked);
     if (order !== null) rememberLed(graph, order);
@@ -573,7 +553,17 @@ export function StartDialog(props: Props) {
           onChange={(event) => setReason(event.currentTarget.value)}
         />
       )}
-      {waits && <QueueButton graph={graph} wanted={{ ...sent, ...override }} onEntered={onClose} />}
+      {repeat === null && (
+        <QueueOffer
+          graph={graph}
+          wanted={sent}
+          looks={looks}
+          robots={engines}
+          obstacle={waitObstacle}
+          reason={reason}
+          onSent={onClose}
+        />
+      )}
       <footer className={style.foot}>
         <Exactly
           name={name}

@@ -10,12 +10,11 @@ import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Started, type StartOrder, sendPress, startRun, type Watching } from "../../api/runs";
 import type { StartFrom, StartValues } from "../../api/starts";
-import { serverNow } from "../../clock/server-clock";
 import type { RunBreakpoint } from "../../graph/breakpoints";
 import { newAid } from "../../graph/document-keys";
 import { memberText } from "../../graph/json-members";
+import { sendNoted, Unanswered } from "../../status/unanswered-starts";
 import { isolated } from "../../words/isolated";
-import { unansweredStarts } from "./unanswered-starts";
 
 export interface StartInput {
   /** The moment that shall run; awaited when the page has yet to hear its name. */
@@ -68,6 +67,11 @@ export function notifyFailure(title: string, message: string): void {
 /** An error of a request whose outcome nobody knows: the message stays until a person closes it. */
 class NotKnown extends Error {}
 
+/** Return a name of a press of what was looked at: the same for the same. */
+export function pressOf(what: string, { umrf: _, ...named }: LookedAtOrder): string {
+  return `${what} ${JSON.stringify(named)}`;
+}
+
 /**
  * Send a press of what was looked at. If its answer gets lost, the next press of the same is sent with the same
  * request id, so that the two count once, and the error says that nobody knows.
@@ -77,10 +81,7 @@ export function sendLookedAt<T>(
   order: LookedAtOrder,
   send: (order: StartOrder) => Promise<T>,
 ): Promise<T> {
-  const { umrf: _, ...named } = order;
-  const press = sendPress(`${what} ${JSON.stringify(named)}`, (request) =>
-    send({ ...order, request }),
-  );
+  const press = sendPress(pressOf(what, order), (request) => send({ ...order, request }));
   return press.catch((error: unknown) => {
     throw isOutcomeUnknown(error) ? new NotKnown(errorText(error)) : error;
   });
@@ -142,8 +143,10 @@ export function useStart(graph: string) {
     mutationFn: async (wanted: StartInput) => {
       const { version, order } = await ordered(wanted);
       const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
-      const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
-      const started = await surely(what, { ...order, request: newAid() });
+      const started = await surely(versionWords(versions, version), {
+        ...order,
+        request: newAid(),
+      });
       for (const run of started.runs) live?.learn(run);
       return started;
     },
@@ -164,21 +167,17 @@ export function useStart(graph: string) {
 const NOTHING_KNOWN: Started = { runs: [], failed: {} };
 
 /** Sends a start. Where nobody says what became of it, that is looked for, and no failure is told. */
-async function surely(what: string, order: StartOrder): Promise<Started> {
+function surely(what: string, order: StartOrder): Promise<Started> {
   const { request, graph, engines } = order;
-  unansweredStarts.sends({ request, graph, what, engines, at: serverNow() });
-  try {
-    const started = await startRun(order);
-    unansweredStarts.settle(request);
-    return started;
-  } catch (error) {
-    if (isOutcomeUnknown(error)) {
-      unansweredStarts.doubt(request);
-      return NOTHING_KNOWN;
-    }
-    unansweredStarts.settle(request);
+  return sendNoted({ request, graph, what, engines }, () => startRun(order)).catch((error) => {
+    if (error instanceof Unanswered) return NOTHING_KNOWN;
     throw error;
-  }
+  });
+}
+
+/** Return the version of an order in words, as "v3 of patrol". */
+export function versionWords(versions: readonly Version[], version: Version): string {
+  return `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;
 }
 
 function nameIn(version: Version): string {

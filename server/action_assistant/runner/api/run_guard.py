@@ -42,7 +42,7 @@ FILTERED: Final = frozenset(
             "/api/groups",
             "/api/preflight",
             "/api/asked_inputs",
-            "/api/starts/{request_id:str}",
+            "/api/starts/{request_id:path}",
             "/api/repeats",
             "/api/repeats/{repeat:str}",
             "/api/queue",

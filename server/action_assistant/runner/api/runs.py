@@ -52,6 +52,7 @@ from action_assistant.runner.api.run_guard import (
 )
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
+from action_assistant.runner.queues.entry import request_of
 from action_assistant.runner.review import audit_facts
 from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
@@ -161,21 +162,29 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         )
 
     @get(
-        "/api/starts/{request_id:str}",
-        summary="The runs that a start has become, by its request_id",
+        # As a path: the request id of a start out of the queue, or of a repeat, has slashes.
+        "/api/starts/{request_id:path}",
+        summary="The runs, or the entry of the queue, that a start has become, by its request_id",
         operation_id="getStart",
         guards=[Needs("see")],
     )
     async def started(request_id: str, request: _Asking) -> views.StartShown:
+        request_id = request_id.removeprefix("/")
+        queues, history = services.queues, services.control.history
         # Before the query: a start that is not under way any more is stored.
-        under_way = services.control.under_way(request_id)
-        rows = await services.control.history.rows(queries.of_start(request_id))
+        under_way = services.control.under_way(request_id) or queues.is_entering(request_id)
+        queued = await queues.queued(request_id)
+        rows = list(await history.rows(queries.of_start(request_id)))
+        if queued is not None:
+            rows += await history.rows(queries.of_start(request_of(queued.entry)))
         runs = [await services.control.find(row.id) for row in rows]
         found = [
             shown(services, request, await _run_view(services, run), run_graphs(run))
             for run in runs
         ]
-        return views.StartShown(request_id=request_id, under_way=under_way, runs=found)
+        return views.StartShown(
+            request_id=request_id, under_way=under_way, runs=found, queued=queued
+        )
 
     return [start, started]
 

@@ -595,8 +595,8 @@ class StartChecks:
         self, looks: Sequence[Preflight], request: StartRequest, starter: Identity
     ) -> list[Preflight]:
         """Return the pre-flights of a start with the items about a second person, who says yes also to
-        what all of them would override."""
-        codes = {code for each in looks for code in each.override}
+        what it overrides; if it does not say that yet, to what all of them would."""
+        codes = overridden_in(request) or {code for each in looks for code in each.override}
         found: list[Preflight] = []
         is_led = self.leads(request.engine, request.robots)
         for look in looks:

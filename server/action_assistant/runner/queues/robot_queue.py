@@ -65,8 +65,9 @@ class Entry:
 
 class Look(msgspec.Struct, frozen=True):
     """A pre-flight of an entry. `differs`: what is no longer as its person saw it; `digest`: by which a
-    person says that they have looked at it."""
+    person says that they have looked at it; `overridden`: the codes of what it overrides."""
 
     looks: tuple[Preflight, ...]
     differs: tuple[str, ...]
     digest: str
+    overridden: tuple[str, ...] = ()

@@ -8,6 +8,7 @@ in the step in which the run is there.
 """
 
 import logging
+from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from typing import Final
@@ -60,9 +61,10 @@ from action_assistant.runner.runs.doubts import Doubt
 from action_assistant.runner.runs.events import Author, StoredKind, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.views import QueuedStart
 from action_assistant.runner.start.admission import StartRequest, Watching
 from action_assistant.runner.start.kept_starts import graph_of, group_of, start_of, text_of
-from action_assistant.runner.start.orders import engines_of, watched_in
+from action_assistant.runner.start.orders import engines_of, overridden_in, watched_in
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.rights import Denied, may
@@ -96,6 +98,7 @@ class Queues:
         self._entries: list[Entry] = []
         self._queues: dict[str, RobotQueue] = {}
         self._going: set[str] = set()  # runs that are not over
+        self._putting: Counter[str] = Counter()  # request ids of starts that are being put there
         self._robots_of: LruCache[str, frozenset[str]] = LruCache(_REMEMBERED)
         self._entering = anyio.Lock()
         self._watchers: list[Callable[[], None]] = []
@@ -153,6 +156,19 @@ class Queues:
             raise NotFound("This is not in the queue: it has left it, or never was.")
         return found
 
+    def is_entering(self, request_id: str) -> bool:
+        """Return whether the start with this request id is being put into the queue at this moment."""
+        return self._putting[request_id] > 0
+
+    async def queued(self, request_id: str) -> QueuedStart | None:
+        """Return the entry that the start with this request id has become; None if it has become none.
+        Raise Unavailable if the journal cannot be read."""
+        id_ = entry_id(request_id)
+        waits = any(each.id == id_ for each in self._entries)
+        if not waits and not await self._journal.read(stream_of(id_), limit=1):
+            return None
+        return QueuedStart(id_, waits)
+
     async def _start_in(self, entry: Entry, watching: Watching) -> StartRequest:
         """Return the one start of an entry. Raise BadInput if a person watches a robot that does not
         move, Unavailable if it cannot be read."""
@@ -166,7 +182,8 @@ class Queues:
         looks = await self._control.look(group_of(start), identity.person.id, identity)
         rules = {name: self._control.rights.of(name).rules for name in engines_of(start)}
         now = looked_of(looks, rules)
-        return Look(tuple(looks), differences(seen, now, looks), digest_of(now)), now
+        differs = differences(seen, now, looks)
+        return Look(tuple(looks), differs, digest_of(now), overridden_in(start)), now
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
         """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
@@ -190,6 +207,7 @@ class Queues:
         own_queues = [self._queue_of(name) for name in queue_names_of(robots)]
         for queue in own_queues:
             queue.entering += 1  # a Stop from here on closes it
+        self._putting[start.request_id] += 1
         try:
             known = await self._known(request, author)
             if known is not None:
@@ -220,6 +238,7 @@ class Queues:
             )
             return await self._enter(entered, request, identity)
         finally:
+            self._putting -= Counter({start.request_id: 1})
             for queue in own_queues:
                 queue.entering -= 1
             self._drop_empty()

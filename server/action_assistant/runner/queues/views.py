@@ -94,16 +94,19 @@ class QueueShown(msgspec.Struct, frozen=True, kw_only=True):
 
 class LookShown(msgspec.Struct, frozen=True, kw_only=True):
     """The pre-flight of an entry now. `look`: by which its start says what was looked at; `differs`: as
-    of the entry."""
+    of the entry; `overridden`: the codes of what it is started in spite of."""
 
     look: str
     looks: tuple[Preflight, ...]
     differs: tuple[str, ...]
+    overridden: tuple[str, ...]
 
 
 def look_view(look: Look) -> LookShown:
     """Return a look as people see it."""
-    return LookShown(look=look.digest, looks=look.looks, differs=look.differs)
+    return LookShown(
+        look=look.digest, looks=look.looks, differs=look.differs, overridden=look.overridden
+    )
 
 
 def queue_view(

@@ -334,13 +334,22 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
     health: dict[str, tuple[str, ...]] = {}
 
 
+class QueuedStart(msgspec.Struct, frozen=True):
+    """A start that was put into the queue. `waits`: it is there still; else it was started, or removed."""
+
+    entry: str
+    waits: bool
+
+
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
-    """The state of a start. `under_way`: it is being carried out now. If it is false and `runs` is
-    empty, the start has not arrived here so far."""
+    """The state of a start. `under_way`: it is being carried out now; `queued`: the entry of the queue
+    that it has become, whose run is one of `runs`. If all of them are empty, the start has not arrived
+    here so far."""
 
     request_id: str
     under_way: bool
     runs: list[RunShown]
+    queued: QueuedStart | None = None
 
 
 def time(us: int) -> datetime:

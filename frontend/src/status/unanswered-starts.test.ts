@@ -1,6 +1,15 @@
 import { expect, test } from "vitest";
-import type { StartFound } from "../../api/runs";
-import { missing, type SentStart, UnansweredStarts, unknownWords } from "./unanswered-starts";
+import { Refusal } from "../api/http";
+import type { StartFound } from "../api/runs";
+import {
+  missing,
+  type SentStart,
+  sendNoted,
+  Unanswered,
+  UnansweredStarts,
+  unansweredStarts,
+  unknownWords,
+} from "./unanswered-starts";
 
 const sent: SentStart = {
   request: "q",
@@ -65,6 +74,7 @@ test("of a group it is told which robots have a run and which are not known", ()
     request_id: "q",
     under_way,
     runs: engines.map((engine) => ({ engine }) as StartFound["runs"][number]),
+    queued: null,
   });
   expect(missing(sent, undefined)).toEqual(["David", "Eve"]);
   expect(unknownWords(sent, found(["Eve", "David"]), false)).toBeNull();
@@ -73,4 +83,27 @@ test("of a group it is told which robots have a run and which are not known", ()
   expect(half).toContain("nothing of this start so far");
   expect(unknownWords(sent, found([], true), false)).toContain("still carrying it out");
   expect(unknownWords(sent, found([]), true)).toContain("has not answered");
+});
+
+test("of a start for the queue it is told whether it is there, and that nothing starts by it", () => {
+  const queues: SentStart = { ...sent, queues: true };
+  const nothing: StartFound = { request_id: "q", under_way: false, runs: [], queued: null };
+  const words = unknownWords(queues, nothing, false);
+  expect(words).toContain("NOT KNOWN whether v3 of patrol was put into the queue.");
+  expect(words).toContain("Nothing starts by that.");
+  expect(unknownWords(queues, { ...nothing, under_way: true }, false)).toContain("just looking");
+  const there = { ...nothing, queued: { entry: "e", waits: true } };
+  expect(unknownWords(queues, there, false)).toBeNull();
+});
+
+test("a press of the same that is sent again is one unanswered start, until it is answered", async () => {
+  const lost = () => Promise.reject(new TypeError("Failed to fetch"));
+  const refusal = new Refusal({ type: "conflict", title: "No", status: 409, detail: "No." });
+  await expect(sendNoted(sent, lost)).rejects.toBeInstanceOf(Unanswered);
+  await expect(sendNoted(sent, lost)).rejects.toBeInstanceOf(Unanswered);
+  expect(unansweredStarts.now().map(({ request }) => request)).toEqual(["q"]);
+  await expect(sendNoted(sent, () => Promise.reject(refusal))).rejects.toBe(refusal);
+  expect(unansweredStarts.now()).toEqual([]);
+  expect(await sendNoted(sent, () => Promise.resolve("there"))).toBe("there");
+  expect(unansweredStarts.now()).toEqual([]);
 });

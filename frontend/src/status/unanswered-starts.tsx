@@ -6,21 +6,24 @@ import { CloseButton, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { Link } from "wouter";
-import { CONDUCTED, engineWords } from "../../api/led-runs";
-import { useLive } from "../../api/page-link";
-import { SIMULATOR } from "../../api/robots";
-import { findStart, type Run, type StartFound } from "../../api/runs";
-import { useRunStatus } from "../../status/progress";
-import { colorOfName } from "../../ui/name-colors";
-import { useWatched, Watched } from "../../ui/watched";
-import { isolated } from "../../words/isolated";
+import { errorText, isOutcomeUnknown } from "../api/http";
+import { CONDUCTED, engineWords } from "../api/led-runs";
+import { useLive } from "../api/page-link";
+import { SIMULATOR } from "../api/robots";
+import { findStart, type Run, type StartFound } from "../api/runs";
+import { serverNow } from "../clock/server-clock";
+import { colorOfName } from "../ui/name-colors";
+import { useWatched, Watched } from "../ui/watched";
+import { isolated } from "../words/isolated";
+import { useRunStatus } from "./progress";
 import style from "./unanswered-starts.module.css";
 
 const AGAIN = 2_000; // ms between two looks
 const PATIENCE = 5_000; // ms that one look waits
 
-/** The engines of a start that the runner has no run for. */
-export function missing(sent: SentStart, found: StartFound | undefined): string[] {
+/** The engines of a start that the runner has no run for; none once it is known to be in the queue. */
+export function missing(sent: SentStart, found: StartFound | undefined): readonly string[] {
+  if (sent.queues) return found?.queued ? [] : sent.engines;
   const there = new Set((found?.runs ?? []).map((run) => run.engine));
   return sent.engines.filter((engine) => !there.has(engine));
 }
@@ -33,6 +36,7 @@ export function unknownWords(
 ): string | null {
   const left = missing(sent, found);
   if (left.length === 0) return null;
+  if (sent.queues) return queueWords(sent.what, found, silent);
   const where = left.map((engine) =>
     engine === SIMULATOR ? "the simulator" : engine === CONDUCTED ? "its robots" : engine,
   );
@@ -41,6 +45,32 @@ export function unknownWords(
   if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
   if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;
   return `${head} The runner knows nothing of this start so far. ${after}`;
+}
+
+function queueWords(what: string, found: StartFound | undefined, silent: boolean): string {
+  const head = `NOT KNOWN whether ${what} was put into the queue.`;
+  const after = "Nothing starts by that. Another press of the same counts once.";
+  if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
+  if (found.under_way) return `${head} The runner is just looking at it. ${after}`;
+  return `${head} The runner knows nothing of it so far. ${after}`;
+}
+
+/** Says what a start has become that was put into the queue. */
+function Queued({ sent, found }: { sent: SentStart; found: StartFound }) {
+  if (!found.queued || found.runs.length > 0) return null;
+  return (
+    <p className={style.found}>
+      <span>
+        {found.queued.waits ? (
+          <>
+            Put into <Link to="/runs/queue">the queue</Link> after all: {sent.what}.
+          </>
+        ) : (
+          `${sent.what} was put into the queue, and has been removed from it.`
+        )}
+      </span>
+    </p>
+  );
 }
 
 function Found({ run }: { run: Run }) {
@@ -77,6 +107,7 @@ function Start({ sent }: { sent: SentStart }) {
     <div className={style.start} data-unknown={unknown !== null || undefined}>
       <div>
         {unknown !== null && <p role="alert">{unknown}</p>}
+        {sent.queues && found && <Queued sent={sent} found={found} />}
         {runs.map((run) => (
           <Found key={run.id} run={run} />
         ))}
@@ -113,6 +144,8 @@ export interface SentStart {
   /** The graph that was sent, in words: "v3 of patrol". */
   what: string;
   engines: readonly string[];
+  /** Set if it was sent to wait in the queue. */
+  queues?: true;
   /** Time at which it was sent, ms. */
   at: number;
 }
@@ -148,7 +181,8 @@ export class UnansweredStarts {
    */
   sends(start: SentStart): void {
     this.#awaited.add(start.request);
-    this.#put([...this.#sent, start].slice(-MOST));
+    const others = this.#sent.filter(({ request }) => request !== start.request);
+    this.#put([...others, start].slice(-MOST));
   }
 
   /** There will be no answer. */
@@ -198,3 +232,30 @@ function storage(): Storing | null {
 }
 
 export const unansweredStarts = new UnansweredStarts(storage());
+
+/** The error of a start that nobody has answered: the notice of such starts says it. */
+export class Unanswered extends Error {}
+
+/**
+ * Send a start, or one for the queue. Where nobody says what became of it, the page looks for it from then on,
+ * and the promise rejects with `Unanswered`.
+ */
+export async function sendNoted<T>(
+  start: Omit<SentStart, "at">,
+  send: () => Promise<T>,
+): Promise<T> {
+  const { request } = start;
+  unansweredStarts.sends({ ...start, at: serverNow() });
+  try {
+    const answer = await send();
+    unansweredStarts.settle(request);
+    return answer;
+  } catch (error) {
+    if (isOutcomeUnknown(error)) {
+      unansweredStarts.doubt(request);
+      throw new Unanswered(errorText(error));
+    }
+    unansweredStarts.settle(request);
+    throw error;
+  }
+}

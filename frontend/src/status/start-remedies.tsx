@@ -1,12 +1,13 @@
-/** A second person's yes to a start: who has said it, and a way to say it and to ask for it. */
+/** What mends a look before a start on the spot: the baton, a second person's yes, a confirmation. */
 import { Button, Text } from "@mantine/core";
 import { IconSend, IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { renewing } from "../../api/client";
-import { errorText } from "../../api/http";
-import { useLive } from "../../api/page-link";
-import { useMay, usePerson } from "../../api/people";
-import type { Preflight } from "../../api/robots";
+import { renewing } from "../api/client";
+import { errorText, unconfirmed } from "../api/http";
+import { useLive } from "../api/page-link";
+import { useMay, usePerson } from "../api/people";
+import { useRight } from "../api/rights";
+import type { Preflight } from "../api/robots";
 import {
   type Approval,
   type ApprovalWanted,
@@ -14,9 +15,10 @@ import {
   askApproval,
   fetchApprovals,
   type StartValues,
-} from "../../api/starts";
-import { isolated } from "../../words/isolated";
-import style from "./start-dialog.module.css";
+} from "../api/starts";
+import { isolated } from "../words/isolated";
+import { TakeBaton } from "./robot-rights";
+import style from "./start-remedies.module.css";
 
 interface SecondPersonProps {
   graph: string;
@@ -27,6 +29,49 @@ interface SecondPersonProps {
   /** The question whose values these are. */
   taken: ApprovalWanted | null;
 }
+
+/** Return the robots that ask this person to confirm who they are. */
+export function askingRobots(looks: readonly Preflight[] | undefined): string[] {
+  const asks = ({ items }: Preflight) =>
+    items.some(({ code, verdict }) => code === "confirm" && verdict === "blocked");
+  return (looks ?? []).filter(asks).map(({ engine }) => engine);
+}
+
+/** Offers to confirm who one is, before anything is held; whatever shows it stays as it is. */
+export function ConfirmFirst({ looks }: { looks: readonly Preflight[] | undefined }) {
+  const robots = askingRobots(looks);
+  if (robots.length === 0) return null;
+  return (
+    <section className={style.second} aria-label="Confirm that it is you">
+      <Button
+        size="compact-sm"
+        leftSection={<IconUserCheck size={14} aria-hidden />}
+        onClick={() => unconfirmed.set(robots)}
+      >
+        Confirm that it is you …
+      </Button>
+    </section>
+  );
+}
+
+/** Offers the baton of a robot that it would need. */
+export function BatonRemedy({ engine, onTaken }: { engine: string; onTaken: () => void }) {
+  const { now } = useLive();
+  const robot = now.engines.find(({ name }) => name === engine);
+  const mayTake = useRight(engine)?.may_take ?? false;
+  if (robot === undefined || !mayTake) return null;
+  return (
+    <span className={style.remedies}>
+      <TakeBaton robot={robot} onTaken={onTaken} />
+    </span>
+  );
+}
+
+const YES_AGAIN = 5_000; // ms
+
+/** Return whether nobody else has said yes. */
+const isMissing = (given: readonly Approval[], me: string): boolean =>
+  given.every(({ author }) => author.id === me);
 
 const demands = (looks: SecondPersonProps["looks"]) =>
   looks?.find(({ items }) => items.some(({ code }) => code === "approved"));
@@ -62,6 +107,8 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
     queryKey: key,
     queryFn: ({ signal }) => fetchApprovals(runner, digest, signal),
     enabled: digest !== "",
+    // Whoever waits for a yes sees it when it comes.
+    refetchInterval: ({ state }) => (isMissing(state.data ?? [], person.id) ? YES_AGAIN : false),
   });
   const say = useMutation({
     mutationFn: () => approve(runner, { digest, graph, version: label, note: "" }),
@@ -74,7 +121,7 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
     mutationFn: () => askApproval(runner, { digest, robots, graph, version: label, values }),
   });
   if (digest === "") return null;
-  const isMissing = given.data?.every(({ author }) => author.id === person.id) ?? false;
+  const lacks = given.data !== undefined && isMissing(given.data, person.id);
   const mine = given.data?.some(({ author }) => author.id === person.id) ?? true;
   return (
     <section className={style.second} aria-label="A second person">
@@ -98,7 +145,7 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
           Say yes to {isolated(label)}, for somebody else to start it
         </Button>
       )}
-      {may && isMissing && (
+      {may && lacks && (
         <Button
           size="compact-sm"
           variant="default"
@@ -110,11 +157,11 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
           Ask others for their yes
         </Button>
       )}
-      {ask.isSuccess && (
+      {lacks && ask.isSuccess && (
         <Text size="sm" role="status">
           {ask.data > 0
             ? "Others are asked by mail or webhook."
-            : "No receiver of such messages is set here: ask somebody yourself. They see it where they start the graph."}
+            : "No receiver of such messages is set here: ask somebody yourself. They see it where they start the graph, or in the queue."}
         </Text>
       )}
       {[say.error, ask.error].map(
