@@ -70,6 +70,17 @@ def test_an_installation_that_runs_and_is_sound_has_nothing_wrong(
     assert f"✓ 127.0.0.1:{one.port}: The editor runs there." in told.stdout
 
 
+def test_a_folder_that_is_served_elsewhere_is_asked_at_its_own_address(
+    product: tuple[Product, int],
+) -> None:
+    """Nobody has to know the port, and the editor of another folder is not examined for it."""
+    one, _ = product
+    told = one.cli("doctor", "--only", "machine", "--data", str(one.data))
+    assert f"✓ 127.0.0.1:{one.port}: The editor runs there." in told.stdout
+    assert f"✓ 127.0.0.1:{one.port + 1}: The runner runs there." in told.stdout
+    assert "served-elsewhere" not in told.stdout
+
+
 def test_a_port_that_another_program_has_is_named(data: Path) -> None:
     port = free_ports()
     with socket.socket() as other:

@@ -153,12 +153,14 @@ def _add_doctor(doctor: argparse.ArgumentParser) -> None:
         metavar="URL",
         help="of the editor; default: the one that was served last",
     )
-    doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
+    doctor.add_argument(
+        "--host", metavar="H", help="default: the one that serves DIR, or 127.0.0.1"
+    )
     doctor.add_argument(
         "--port",
         type=settings.port_number,
         metavar="N",
-        help="of the editor; default: ACTION_ASSISTANT_PORT",
+        help="of the editor; default: the one that serves DIR, or ACTION_ASSISTANT_PORT",
     )
     doctor.add_argument(
         "--public-url", metavar="URL", help="where a proxy shows the page; it is asked there"
@@ -186,14 +188,15 @@ COMMANDS: Final = {"doctor": _add_doctor}
 def _doctor(options: argparse.Namespace) -> int:
     with suppress(CannotStart):  # reported as a finding
         settings.take_secrets_from_files()
-    port = Installation.port_of_settings() if options.port is None else options.port
     place = Installation(
         data=options.data.absolute(),
         database=options.database or settings.database(),
-        host=options.host,
-        port=port,
+        host=options.host or "127.0.0.1",
+        port=options.port or Installation.port_of_settings(),
         public_url=options.public_url,
     )
+    if options.host is None and options.port is None:
+        place = place.where_served()
     if options.here:
         print(msgspec.json.encode(look_here(place)).decode())
         return 0
