@@ -17,6 +17,7 @@ from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.cli import main
+from action_assistant.commands import remote
 from action_assistant.commands.client import Server
 from action_assistant.commands.presses import press
 from action_assistant.commands.remote import insisting, stopped_as, verdict
@@ -270,6 +271,23 @@ def test_a_stop_insists_where_connections_break() -> None:
             url = f"http://127.0.0.1:{listener.getsockname()[1]}"
             assert insisting(Server(client, url), "POST", "/api/stop") == {"runs": []}
         serving.result(5)
+
+
+def test_a_stop_without_an_answer_leads_to_the_hardware_stop(
+    product: Product, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The runner is frozen, as one whose computer hangs."""
+    monkeypatch.setattr(remote, "_STOP_ANSWER_S", 0.5)
+    monkeypatch.setattr(remote, "_INSIST_S", 0.5)
+    runner = product.process("runner")
+    runner.suspend()
+    try:
+        answer = product.cli("stop", "--all", "--data", str(product.data))
+    finally:
+        runner.resume()
+    assert answer.returncode == 2
+    assert "NO ANSWER TO THE STOP" in answer.stderr
+    assert "use its hardware stop" in answer.stderr
 
 
 def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, str]) -> None:

@@ -31,6 +31,7 @@ _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", 
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
 _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
+_STOP_ANSWER_S: Final = 10.0  # after which a runner that is silent about a Stop is called silent
 _LOOK_AT_ROBOT: Final = "Look at the robot; use its hardware stop."
 
 Run: TypeAlias = dict[str, Any]
@@ -489,7 +490,7 @@ def insisting(server: Server, method: str, path: str) -> Any:
     deadline = time.monotonic() + _INSIST_S
     while True:
         try:
-            return server.runner(method, path).json()
+            return server.runner(method, path, timeout=_STOP_ANSWER_S).json()
         except CannotStart:
             if time.monotonic() > deadline:
                 raise
@@ -503,7 +504,7 @@ def _stop(options: argparse.Namespace) -> int:
     server does not answer."""
     with _reached_for_stop(options) as server:
         path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
-        asked = insisting(server, "POST", path)
+        asked = _sent(server, path)
         with _following():
             others = asked.get("graphs", {})
             is_over = not asked["runs"] and not options.all
@@ -544,19 +545,28 @@ def _reached_for_stop(options: argparse.Namespace) -> Iterator[Server]:
         yield server
 
 
+def _sent(server: Server, path: str) -> Any:
+    """Send a Stop and return the answer's JSON. Raise CannotStart, with a sentence that the Stop may
+    not have arrived, if none comes."""
+    try:
+        return insisting(server, "POST", path)
+    except CannotStart as error:
+        raise CannotStart(f"NO ANSWER TO THE STOP. {error} {_LOOK_AT_ROBOT}") from error
+
+
 @contextmanager
 def _following() -> Iterator[None]:
-    """Say that a Stop was sent, if what becomes of it is refused: a token that has expired may stop
-    and see nothing."""
+    """Say that a Stop was sent, if what becomes of it is refused (a token that has expired may stop
+    and see nothing) or not answered."""
+    sent = "Stop was sent; what became of it is not known here."
     try:
         yield
     except RequestRefused as error:
         if error.status not in {401, 403}:
             raise
-        raise RequestRefused(
-            f"Stop was sent; what became of it is not known here. {error} {_LOOK_AT_ROBOT}",
-            error.status,
-        ) from error
+        raise RequestRefused(f"{sent} {error} {_LOOK_AT_ROBOT}", error.status) from error
+    except CannotStart as error:
+        raise CannotStart(f"{sent} {error} {_LOOK_AT_ROBOT}") from error
 
 
 def _is_run(server: Server, run: str) -> bool:
