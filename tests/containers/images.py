@@ -88,8 +88,10 @@ def make_bases() -> None:
         root = FOLDER / f"{suite}.tar"
         if not root.exists():
             part = root.with_suffix(".part")
+            # What is broken off begins anew, so nothing has to be on the disk at once.
             run("mmdebstrap", "--quiet", "--variant=apt", "--format=tar",
-                "--include=ca-certificates", suite, part)  # fmt: skip
+                "--dpkgopt=force-unsafe-io", "--include=ca-certificates",
+                suite, part, timeout=3600)  # fmt: skip
             part.rename(root)
         if run("podman", "image", "exists", f"debian-{suite}", check=False).returncode:
             podman("import", root, f"debian-{suite}")
