@@ -17,6 +17,7 @@ from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.system.served_addresses import published
+from action_assistant.web.monitoring import faults
 from action_assistant.web.monitoring.faults import (
     FaultWatch,
     Hang,
@@ -27,10 +28,12 @@ from action_assistant.web.monitoring.faults import (
     other_faults,
     own_faults,
     storage_faults,
+    watch_of,
 )
 from action_assistant.web.monitoring.storage import Storage
 from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.notifications.receivers import Mailbox
+from web.notifications.receiving import http_receiver
 
 pytestmark = pytest.mark.anyio
 
@@ -100,6 +103,24 @@ async def test_a_fault_that_lasts_is_told_once_a_day_to_who_wants_it(
     texts = {}
     await watch.look()
     assert watch.found == ()
+
+
+async def test_the_disk_that_both_processes_share_is_told_by_one(
+    journal: Journal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The runner tells it where no editor is beside it, or none that works."""
+    monkeypatch.setattr(faults, "_LASTS_S", 0.0)
+    little = Storage(at=0, free=1, size=10)
+    watch = watch_of(
+        "runner", tmp_path, journal, RECEIVERS, page="", tls=False, storage=lambda: (little, None)
+    )
+    with http_receiver() as editor:  # it answers, and names no part that is broken
+        with published(tmp_path, "editor", f"http://127.0.0.1:{editor.port}"):
+            await watch.look()
+        assert [each.what for each in watch.found] == ["disk"]
+        assert await messages(journal) == []
+    await watch.look()
+    assert await messages(journal) == [("chat", "disk")]
 
 
 async def test_a_look_that_fails_hides_no_other(journal: Journal) -> None:

@@ -224,6 +224,27 @@ async def test_a_test_that_arrives_switches_a_receiver_on_again(tmp_path: Path) 
     await journal.close()
 
 
+async def test_a_message_about_no_graph_keeps_its_reason(tmp_path: Path) -> None:
+    journal, told = await _open(tmp_path), list[str]()
+    facts = {"what": "disk", "why": "Little is left."}
+    values = row("fault/disk:1:a", "a", "server.fault", "disk", utc_us(), facts)
+    await journal.derive(lambda c: c.execute(insert(outbox).values(values)))
+
+    async def hidden(_: Message) -> bool:
+        return False
+
+    sender = Notifications(
+        *(journal, RECEIVERS[:1], ["server.fault"], "", hidden),
+        deliver=lambda _, message, __: told.append(message.text),
+        gap_s=0,
+        look_s=0.01,
+    )
+    async with sender.sending():
+        await _until(lambda: _true(told))
+    assert told == ["The server needs a person. Little is left."]
+    await journal.close()
+
+
 async def test_a_slow_receiver_delays_nothing_else(tmp_path: Path) -> None:
     journal = await _open(tmp_path)
     with http_receiver() as slow, http_receiver() as quick:

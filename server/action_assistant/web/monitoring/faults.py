@@ -73,7 +73,7 @@ class Hang(msgspec.Struct, frozen=True):
 
 class FaultWatch:
     """Looks for faults periodically, and writes a message to each receiver that wants them about
-    one that lasts, once a day at most."""
+    one that lasts, once a day at most. `left`: which faults the other process tells at present."""
 
     def __init__(
         self,
@@ -81,11 +81,13 @@ class FaultWatch:
         receivers: Sequence[Receiver],
         looks: Sequence[Look],
         *,
+        left: Callable[[Faults], Awaitable[frozenset[str]]] | None = None,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self._journal = journal
         self._receivers = [each.name for each in receivers if KIND in each.kinds]
         self._looks = looks
+        self._left = left
         self._clock = clock
         self._told: dict[str, float] = {}
         self.found: tuple[Fault, ...] = ()
@@ -110,8 +112,9 @@ class FaultWatch:
         self.found = tuple(
             Fault(what, text, since.get(what, began)) for what, text in sorted(texts.items())
         )
+        left = frozenset() if self._left is None else await self._left(texts)
         for fault in self.found:
-            if now - fault.since.timestamp() >= _LASTS_S:
+            if fault.what not in left and now - fault.since.timestamp() >= _LASTS_S:
                 await self._tell(fault, now)
 
     async def _tell(self, fault: Fault, now: float) -> None:
@@ -324,7 +327,8 @@ def watch_of(
     storage: Callable[[], tuple[Storage | None, BackupState | None]],
 ) -> FaultWatch:
     """Return the watch of a process. The editor also looks at backups, at what `serve` has ended,
-    and at certificates: of the public address `page`, "" if there is none, and with `tls` its own."""
+    and at certificates: of the public address `page`, "" if there is none, and with `tls` its own.
+    Of the disk that both share it sends the message, if it works."""
     other: Process = "runner" if process == "editor" else "editor"
 
     async def stored() -> Faults:
@@ -339,8 +343,22 @@ def watch_of(
     async def hung() -> Faults:
         return await to_thread.run_sync(hang_faults, data, time.time())
 
+    async def left(texts: Faults) -> frozenset[str]:
+        works = other not in texts and await to_thread.run_sync(_is_beside, data, other)
+        return frozenset({"disk"} if works else ())
+
     looks: list[Look] = [stored, parts, beside]
-    if process == "editor":
-        looks += [hung, CertificateLook(page).look]
-        looks += [OwnCertificateLook(data).look] if tls else []
+    if process == "runner":
+        return FaultWatch(journal, receivers, looks, left=left)
+    looks += [hung, CertificateLook(page).look]
+    looks += [OwnCertificateLook(data).look] if tls else []
     return FaultWatch(journal, receivers, looks)
+
+
+def _is_beside(data: Path, process: Process) -> bool:
+    """Return whether a process serves a data folder on this computer."""
+    try:
+        address = served_address(data, process)
+    except CannotStart:
+        return False
+    return address is not None and address.lives and address.is_here

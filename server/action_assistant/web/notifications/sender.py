@@ -173,7 +173,9 @@ class Notifications:
 
     async def _named(self, message: Message) -> Message:
         """Return a message as it may be sent now: without the name of a graph if not everybody may
-        see the graph, or if this cannot be found out."""
+        see the graph, or if this cannot be found out. A message about no graph has nothing to hide."""
+        if "graph" not in message.facts:
+            return message
         try:
             seen = await self._seen_by_all(message)
         except Exception:  # a failed look at rights holds no message back: it names nothing then
