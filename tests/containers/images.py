@@ -113,13 +113,17 @@ def make_bases() -> None:
         say(f"{name} stood in for: {time.monotonic() - begun:.0f} s, {size(name)} MB")
 
 
-def compose_build(*services: str) -> float:
-    """The images that compose names; how many seconds it took."""
+def compose_build(
+    *services: str, folder: Path = ROOT, version: str = VERSION, commit: str = COMMIT
+) -> float:
+    """The images that compose names; how many seconds it took. `folder`: the checkout from which they
+    are built."""
     begun = time.monotonic()
     command = ["podman-compose", "--podman-build-args", " ".join(reach())]
     for profile in ("simulator", "robot"):
         command += ["--profile", profile]
-    run(*command, "build", *services, timeout=3600, more={"SOURCE_COMMIT": COMMIT})
+    more = {"SOURCE_COMMIT": commit, "IMAGE_VERSION": version}
+    run(*command, "build", *services, timeout=3600, cwd=folder, more=more)
     return time.monotonic() - begun
 
 

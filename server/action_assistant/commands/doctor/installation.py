@@ -44,8 +44,10 @@ class Installation(msgspec.Struct, frozen=True, kw_only=True):
         folder. A process that does not serve it here and now keeps the address that it has."""
         found = self
         with suppress(CannotStart):  # an address that cannot be read: the usual ports are asked
-            for process, name in (("editor", "port"), ("runner", "runner_port")):
-                address = served_address(self.data, process)
+            for address, name in (
+                (served_address(self.data, "editor"), "port"),
+                (served_address(self.data, "runner"), "runner_port"),
+            ):
                 if address is not None and address.lives and address.is_here:
                     url = urlsplit(address.url)
                     found = msgspec.structs.replace(
