@@ -93,6 +93,36 @@ test("a replay shows each moment as it was known then, by mouse and by keyboard"
     .toHaveLength(1);
 });
 
+test("a part of the time is looked at more closely, and a link carries it", async ({ browser }) => {
+  const long = await ran({ "*": [{ after_s: 1.2 }] });
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${long.id}`);
+  const timeline = page.getByRole("region", { name: "Timeline" });
+  const bars = timeline.locator("[data-track] i[data-tone]");
+  await expect(bars).toHaveCount(3);
+  await page.getByRole("slider", { name: "Moment of the run" }).press("Home");
+  await timeline.getByRole("button", { name: "Zoom into the time" }).click();
+  await expect(bars).toHaveCount(2); // the third began later
+  await timeline.getByRole("button", { name: "Zoom into the time" }).click();
+  await expect(bars).toHaveCount(1);
+  await expect(timeline.getByText("0.2 s")).toBeVisible();
+  await expect.poll(() => new URL(page.url()).searchParams.get("until")).not.toBeNull();
+  const shared = page.url();
+  await page.getByRole("slider", { name: "Moment of the run" }).press("End");
+  const next = page.getByRole("button", { name: "The change before" });
+  for (let i = 0; i < 3; i += 1) await next.click();
+  await expect(timeline.getByText("0.2 s")).toBeHidden(); // the part goes where the replay is
+  await page.goto(shared);
+  await expect(bars).toHaveCount(1);
+  await timeline.getByRole("button", { name: "All", exact: true }).click();
+  await expect(bars).toHaveCount(3);
+  const phone = await product.person(browser, "Mari", { viewport: { width: 360, height: 740 } });
+  await phone.page.goto(shared);
+  await phone.page.getByRole("button", { name: "Zoom out of the time" }).click();
+  await expect(phone.page.locator("[data-track] i[data-tone]")).toHaveCount(2);
+  await phone.context.close();
+});
+
 test("what the page showed live is what the replay shows of that moment", async () => {
   const { page } = ada;
   const { id, digest, umrf } = await version(graph);

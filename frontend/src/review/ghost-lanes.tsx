@@ -189,7 +189,7 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
       </header>
       <div className={style.head} aria-hidden>
         <div className={style.ruler}>
-          {ticksOf(span).map((t) => (
+          {ticksOf({ start: 0, span }).map((t) => (
             <span className="absolute nowrap" key={t} style={{ left: percent(t / span) }}>
               {t < 60_000 ? `${t / 1000} s` : duration(t)}
             </span>

@@ -20,6 +20,7 @@ import { runMarks } from "../graph/breakpoints";
 import type { Key } from "../graph/model";
 import { Answers } from "../status/answers";
 import { RunQuestions } from "../status/held-notice";
+import { type TimeRange, turnedTo } from "../status/lanes/axis";
 import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
 import { Timeline, type Track } from "../status/lanes/timeline";
 import { INTO } from "../status/level-places";
@@ -76,18 +77,42 @@ function momentAsked(run: Run, search: string): number | null {
   return t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
 }
 
+/** The part of the time to which a link points; null for all of it. */
+function rangeAsked(search: string): TimeRange | null {
+  const query = new URLSearchParams(search);
+  const [from, until] = ["from", "until"].map((name) => Number(query.get(name) ?? Number.NaN));
+  return from !== undefined && until !== undefined && from >= 0 && until > from
+    ? { from, until }
+    : null;
+}
+
+/** The part of the time that is shown: it goes on like pages with the replay. */
+function useTimeRange({ at, start }: ReplayCursor, search: string) {
+  const [range, setRange] = useState(() => rangeAsked(search));
+  const shown = range === null || at === null ? range : turnedTo(range, at - start);
+  if (shown !== range) setRange(shown);
+  return [shown, setRange] as const;
+}
+
 /** Keeps the address in step, so that it can be sent to somebody. */
-function useAddress(id: string, replay: ReplayCursor, { way, key }: LevelCursor): void {
+function useAddress(
+  id: string,
+  replay: ReplayCursor,
+  { way, key }: LevelCursor,
+  range: TimeRange | null,
+): void {
   const { at, start, playing } = replay;
   useEffect(() => {
     const query = new URLSearchParams();
     for (const { graph, action } of way) query.append("in", `${graph}~${action}`);
     if (at !== null) query.set("t", String(Math.round(at - start)));
     if (key !== null) query.set("action", key);
+    if (range !== null) query.set("from", String(range.from));
+    if (range !== null) query.set("until", String(range.until));
     const search = query.size > 0 ? `?${query}` : "";
     if (playing) return; // browsers refuse an address that changes with every frame
     window.history.replaceState(window.history.state, "", `/runs/${id}${search}`);
-  }, [id, at, start, playing, way, key]);
+  }, [id, at, start, playing, way, key, range]);
 }
 
 /** The runs that began together with this one, as they are known now. */
@@ -248,6 +273,8 @@ interface RunTimelineProps {
   level: LevelCursor;
   /** The runs that began together with this one. */
   mates: readonly Track[];
+  range: TimeRange | null;
+  onRange: (range: TimeRange | null) => void;
 }
 
 /** Every visit, and the controls of the replay. */
@@ -289,6 +316,8 @@ function RunTimeline(props: RunTimelineProps) {
         signs={signs}
         gaps={gaps}
         others={mates}
+        range={props.range}
+        onRange={props.onRange}
       />
     </section>
   );
@@ -310,7 +339,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const replay = useReplay(runner, newest, until, momentAsked(newest, search));
   const { run } = replay;
   const past = replay.at !== null;
-  useAddress(newest.id, replay, level);
+  const [range, setRange] = useTimeRange(replay, search);
+  useAddress(newest.id, replay, level, range);
   const unheard = useUnsure(newest);
   const seen = useProgress(run, !past && unheard, replay.at, level.inside);
   const progress = useMemo(() => withWaits(level.graph, seen), [level.graph, seen]);
@@ -374,6 +404,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           unsure={unsure}
           level={level}
           mates={mates}
+          range={range}
+          onRange={setRange}
         />
         <AboutRun
           runner={runner}

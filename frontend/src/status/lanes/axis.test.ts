@@ -1,7 +1,19 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Visit } from "../../api/runs";
-import { barOf, growingSpan, renewalOf, shareOf, ticksOf, wholeSpan } from "./axis";
+import {
+  barOf,
+  growingSpan,
+  originOf,
+  partOf,
+  renewalOf,
+  shareOf,
+  type TimeRange,
+  ticksOf,
+  turnedTo,
+  wholeSpan,
+  zoomed,
+} from "./axis";
 
 test("an axis of what goes on grows in steps and always holds all of it", () => {
   expect(growingSpan(57_000)).toBe(60_000);
@@ -17,7 +29,7 @@ test("an axis of what goes on grows in steps and always holds all of it", () => 
 test("ticks are few, and begin with the start", () => {
   fc.assert(
     fc.property(fc.integer({ min: 1000, max: 50_000_000 }), (span) => {
-      const ticks = ticksOf(wholeSpan(span));
+      const ticks = ticksOf({ start: 77, span: wholeSpan(span) });
       expect(ticks[0]).toBe(0);
       expect(ticks.length).toBeLessThanOrEqual(9);
     }),
@@ -76,4 +88,81 @@ test("what grows is drawn in steps that stay small on any axis, and once a secon
   expect([10_000, 60_000, 120_000].map((span) => renewalOf({ start: 0, span }))).toEqual([
     250, 500, 1000,
   ]);
+});
+
+const wholes = fc.integer({ min: 1000, max: 50_000_000 });
+
+test("a part that is zoomed stays within the run, holds its moment, and comes back to the whole", () => {
+  fc.assert(
+    fc.property(
+      wholes,
+      fc.double({ min: 0, max: 1, noNaN: true }),
+      fc.nat(20),
+      (whole, at, times) => {
+        const around = at * whole;
+        let range: TimeRange | null = null;
+        for (let n = 0; n < times; n++) range = zoomed(range, whole, around, 0.5);
+        if (range !== null) {
+          expect(range.from).toBeGreaterThanOrEqual(0);
+          expect(range.until).toBeLessThanOrEqual(whole + 1);
+          expect(range.until - range.from).toBeGreaterThanOrEqual(999);
+          expect(around).toBeGreaterThanOrEqual(range.from - 1);
+          expect(around).toBeLessThanOrEqual(range.until + 1);
+        }
+        for (let n = 0; n <= times; n++) range = zoomed(range, whole, around, 2);
+        expect(range).toBeNull();
+      },
+    ),
+  );
+});
+
+test("a part shows few ticks that are counted from the start of the run, and all of them are on it", () => {
+  fc.assert(
+    fc.property(wholes, fc.nat(50_000_000), fc.nat(50_000_000), (span, from, length) => {
+      const axis = partOf({ start: 777, span }, { from, until: from + length });
+      expect(originOf(axis)).toBe(777);
+      const ticks = ticksOf(axis);
+      expect(ticks.length).toBeLessThanOrEqual(9);
+      for (const t of ticks) {
+        expect(777 + t).toBeGreaterThanOrEqual(axis.start);
+        expect(777 + t).toBeLessThanOrEqual(axis.start + axis.span);
+      }
+    }),
+  );
+});
+
+test("a part that an address names beyond the run, or from its end on, is the whole", () => {
+  const whole = { start: 0, span: 10_000 };
+  expect(partOf(whole, { from: 12_000, until: 1e300 })).toBe(whole);
+  expect(partOf(whole, { from: 0, until: 1e300 })).toBe(whole);
+  expect(partOf(whole, { from: 4000, until: 1e300 })).toEqual({
+    start: 4000,
+    span: 6000,
+    origin: 0,
+  });
+});
+
+test("a part goes on to the page that holds a moment, and is as long as before", () => {
+  fc.assert(
+    fc.property(
+      fc.nat(100_000),
+      fc.integer({ min: 1, max: 50_000 }),
+      fc.nat(500_000),
+      (from, length, at) => {
+        const turned = turnedTo({ from, until: from + length }, at);
+        expect(turned.until - turned.from).toBe(length);
+        expect(turned.from).toBeLessThanOrEqual(at);
+        expect(turned.until).toBeGreaterThanOrEqual(at);
+      },
+    ),
+  );
+});
+
+test("nothing is drawn of a visit outside of the part that is shown, and no more than its share inside", () => {
+  const part = partOf({ start: 0, span: 10_000 }, { from: 3000, until: 5000 });
+  expect(barOf(visit({}), part, 10_000, true)).toMatchObject({ sure: { left: 0, width: 0.5 } });
+  const later = partOf({ start: 0, span: 10_000 }, { from: 5000, until: 7000 });
+  expect(barOf(visit({}), later, 10_000, true)).toBeNull();
+  const vague = visit({ not_after: iso(6000) });
+  expect(barOf(vague, later, 10_000, true)?.maybe).toEqual({ left: 0, width: 0.5 });
 });

@@ -1,4 +1,4 @@
-/** The time axis of lanes: how long it is, where a moment stands on it, and its ticks. Pure. */
+/** The time axis of lanes: how long it is, which part of it is shown, where a moment stands on it, its ticks. Pure. */
 
 import { type RefObject, useLayoutEffect } from "react";
 import type { Visit } from "../../api/runs";
@@ -7,10 +7,67 @@ import { instant } from "../../ui/times";
 import { type Tone, visitBegin, visitEnd } from "../progress";
 
 export interface TimeAxis {
-  /** Start of the run, ms. */
+  /** The first moment that is shown, ms. */
   readonly start: number;
   /** ms. */
   readonly span: number;
+  /** Start of the run, ms; set where a part of the run is shown, and what is outside of it is not. */
+  readonly origin?: number;
+}
+
+/** A part of a run, ms after its start. */
+export interface TimeRange {
+  readonly from: number;
+  readonly until: number;
+}
+
+/** The shortest part that is shown, ms: clocks of robots are not better than that. */
+const SHORTEST = 1000;
+
+/** Return the axis of a part of what an axis shows; `null`, and a part that is not on it, is the whole. */
+export function partOf(axis: TimeAxis, range: TimeRange | null): TimeAxis {
+  const { start: origin, span } = axis;
+  const from = range?.from ?? 0;
+  const until = Math.min(range?.until ?? span, span);
+  const isPart = until - from < span && until - from > 0;
+  return isPart ? { start: origin + from, span: until - from, origin } : axis;
+}
+
+/** Return the start of the run, ms, from which the moments of an axis are counted. */
+export function originOf(axis: TimeAxis): number {
+  return axis.origin ?? axis.start;
+}
+
+/**
+ * Return the part that is `factor` times as long, with `around` at the same place; null for the whole.
+ * All in ms after the start of a run that takes `whole`.
+ */
+export function zoomed(
+  range: TimeRange | null,
+  whole: number,
+  around: number,
+  factor: number,
+): TimeRange | null {
+  const { from, until } = range ?? { from: 0, until: whole };
+  const length = Math.max(SHORTEST, (until - from) * factor);
+  if (length >= whole) return null;
+  const share = (Math.min(until, Math.max(from, around)) - from) / (until - from);
+  const wanted = from + share * (until - from - length);
+  const begin = Math.round(Math.min(whole - length, Math.max(0, wanted)));
+  return { from: begin, until: Math.round(begin + length) };
+}
+
+/** Return a part of the same length that holds the moment `at`, ms after the start, like the next page. */
+export function turnedTo(range: TimeRange, at: number): TimeRange {
+  const length = range.until - range.from;
+  if (at >= range.from && at <= range.until) return range;
+  const from = range.from + Math.floor((at - range.from) / length) * length;
+  return { from: Math.max(0, from), until: Math.max(0, from) + length };
+}
+
+/** Return whether a time that begins and ends at these moments, ms, is on an axis at least in part. */
+export function isOn({ start, span, origin }: TimeAxis, begin: number, end = begin): boolean {
+  return origin === undefined || (end >= start && begin <= start + span);
 }
 
 const STEPS = [10, 20, 30, 60, 90, 120, 180, 300, 600, 900, 1800, 3600]; // s
@@ -44,13 +101,17 @@ export function renewalOf({ span }: TimeAxis): number {
   return RENEWALS.find((each) => each * DRAWINGS <= span) ?? 250;
 }
 
-const TICKS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600]; // s
+const TICKS = [0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600]; // s
 const MOST_TICKS = 8;
 
-/** ms since the start of each tick. */
-export function ticksOf(span: number): number[] {
+/** Return the ticks of an axis, ms after the start of the run. */
+export function ticksOf(axis: TimeAxis): number[] {
+  const { start, span } = axis;
   const step = (TICKS.find((each) => span / 1000 / each <= MOST_TICKS) ?? 7200) * 1000;
-  return Array.from({ length: Math.floor(span / step) + 1 }, (_, i) => i * step);
+  const from = start - originOf(axis);
+  const first = Math.ceil(from / step);
+  const count = Math.floor((from + span) / step) - first + 1;
+  return Array.from({ length: count }, (_, i) => (first + i) * step);
 }
 
 /** Shares of the axis, 0 to 1. */
@@ -89,10 +150,13 @@ export function barOf(visit: Visit, axis: TimeAxis, until: number, over: boolean
   const at = (moment: number) => shareOf(axis, moment);
   const earliest = instant(visit.not_before) ?? from;
   const latest = open ? to : (instant(visit.not_after) ?? until);
+  if (!isOn(axis, Math.min(from, earliest), Math.max(to, latest))) return null;
   const wider = at(latest) - at(earliest) - Math.max(0, at(to) - at(from)) > LEAST;
   return {
     sure:
-      to > from || !wider ? { left: at(from), width: Math.max(LEAST, at(to) - at(from)) } : null,
+      isOn(axis, from, to) && (to > from || !wider)
+        ? { left: at(from), width: Math.max(LEAST, at(to) - at(from)) }
+        : null,
     tone: toneOf(visit, open, over),
     open: open && !over,
     maybe: wider ? { left: at(earliest), width: at(latest) - at(earliest) } : null,

@@ -4,7 +4,7 @@ import { type RefObject, useLayoutEffect, useRef, useState } from "react";
 import type { Run, Visit } from "../../api/runs";
 import { instant } from "../../ui/times";
 import { boundsText } from "../durations";
-import { shareOf, type TimeAxis } from "./axis";
+import { isOn, shareOf, type TimeAxis } from "./axis";
 import type { Lane } from "./lanes";
 import style from "./timeline.module.css";
 
@@ -124,7 +124,8 @@ export function HandOverLines({ overs, axis, lanes }: Props) {
     <li ref={lines} className={style.handOvers} aria-hidden>
       {overs.map((over) => {
         const [from, to] = [middles.get(over.from), middles.get(over.to)];
-        if (from === undefined || to === undefined) return null;
+        if (from === undefined || to === undefined || !isOn(axis, over.ended, over.began))
+          return null;
         const [left, right] = [shareOf(axis, over.ended), shareOf(axis, over.began)];
         return (
           <i

@@ -1,4 +1,6 @@
 /** Lanes of runs over time, by robot: one for each action, with what is not known left hatched. */
+import { ActionIcon, Button } from "@mantine/core";
+import { IconZoomIn, IconZoomOut } from "@tabler/icons-react";
 import {
   Fragment,
   type KeyboardEvent,
@@ -15,18 +17,24 @@ import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName, NAME_RANK, useNameColors } from "../../ui/name-colors";
 import { duration, instant, stopwatch, useNow } from "../../ui/times";
+import { Tooltip } from "../../ui/tooltip";
 import { type Progress, progressOf, progressOfAction, type Tone } from "../progress";
 import { endUnknownSince, silentSinceOf, useUnsure } from "../silence";
 import { toneColor } from "../state-label";
 import { waitingFor, waitWords } from "../waits";
 import {
   growingSpan,
+  isOn,
+  originOf,
+  partOf,
   shareOf,
   type TimeAxis,
+  type TimeRange,
   ticksOf,
   useMoving,
   WHOLE_WAY,
   wholeSpan,
+  zoomed,
 } from "./axis";
 import { type HandOver, HandOverLines, handOversOf, handOverWords } from "./hand-overs";
 import { AllLevels, LaneRow, type OpenLanes, useOpenLanes } from "./lane-row";
@@ -48,6 +56,10 @@ interface Props extends Track {
   gaps?: readonly TimeGap[];
   /** Runs on the same axis: those that began together with this one. */
   others?: readonly Track[];
+  /** The part that is shown; null, or not set, is the whole. It is the whole at the live edge. */
+  range?: TimeRange | null;
+  /** Without it no part can be chosen. */
+  onRange?: (range: TimeRange | null) => void;
 }
 
 /** The lanes of a run. */
@@ -89,12 +101,22 @@ function useAxis(tracks: readonly Track[]): TimeAxis {
   return useMemo(() => ({ start, span }), [start, span]);
 }
 
-function Ticks({ span }: { span: number }) {
+/** Return the place of a tick, in per cent of the axis. */
+const tickAt = (axis: TimeAxis, t: number) => `${shareOf(axis, originOf(axis) + t) * 100}%`;
+
+/** Return the time of a tick, with tenths where there are several in a second. */
+function tickText(t: number): string {
+  if (t < 60_000) return `${t / 1000} s`;
+  const tenths = Math.round((t % 1000) / 100);
+  return tenths === 0 ? duration(t) : `${duration(t)}.${tenths}`;
+}
+
+function Ticks({ axis }: { axis: TimeAxis }) {
   return (
     <div className={style.axis} aria-hidden>
-      {ticksOf(span).map((t) => (
-        <span className="absolute nowrap" key={t} style={{ left: `${(t / span) * 100}%` }}>
-          {t < 60_000 ? `${t / 1000} s` : duration(t)}
+      {ticksOf(axis).map((t) => (
+        <span className="absolute nowrap" key={t} style={{ left: tickAt(axis, t) }}>
+          {tickText(t)}
         </span>
       ))}
     </div>
@@ -115,25 +137,29 @@ function Across({ axis, cursor, goes, silentSince, signs, gaps }: AcrossProps) {
   const at = (moment: number) => shareOf(axis, moment) * 100;
   return (
     <div className={style.across} aria-hidden>
-      {ticksOf(axis.span).map((t) => (
-        <i key={t} className={style.tick} style={{ left: `${(t / axis.span) * 100}%` }} />
+      {ticksOf(axis).map((t) => (
+        <i key={t} className={style.tick} style={{ left: tickAt(axis, t) }} />
       ))}
-      {gaps.map((gap) => (
-        <i
-          key={gap.from}
-          className={style.gap}
-          title={gap.text}
-          style={{ left: `${at(gap.from)}%`, width: `${at(gap.until) - at(gap.from)}%` }}
-        />
-      ))}
-      {signs.map((sign) => (
-        <i
-          key={`${sign.at} ${sign.text}`}
-          className={style.sign}
-          title={sign.text}
-          style={{ left: `${at(sign.at)}%`, color: toneColor[sign.tone] }}
-        />
-      ))}
+      {gaps
+        .filter(({ from, until }) => isOn(axis, from, until))
+        .map((gap) => (
+          <i
+            key={gap.from}
+            className={style.gap}
+            title={gap.text}
+            style={{ left: `${at(gap.from)}%`, width: `${at(gap.until) - at(gap.from)}%` }}
+          />
+        ))}
+      {signs
+        .filter((sign) => isOn(axis, sign.at))
+        .map((sign) => (
+          <i
+            key={`${sign.at} ${sign.text}`}
+            className={style.sign}
+            title={sign.text}
+            style={{ left: `${at(sign.at)}%`, color: toneColor[sign.tone] }}
+          />
+        ))}
       <Playhead axis={axis} cursor={cursor} goes={goes} silentSince={silentSince} />
     </div>
   );
@@ -185,7 +211,7 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
     const goal = new Map<string, number | null>([
       ["ArrowLeft", here - 1000],
       ["ArrowRight", cursor === null ? null : here + 1000],
-      ["Home", axis.start],
+      ["Home", originOf(axis)],
       ["End", null],
     ]);
     if (onSeek === undefined || !goal.has(key)) return;
@@ -198,7 +224,7 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
 
 /** Return the slider attributes and keys of the ruler, for people without a pointer. */
 function sliderOf(axis: TimeAxis, cursor: number | null) {
-  const at = cursor === null ? axis.span : cursor - axis.start;
+  const at = cursor === null ? axis.span : cursor - originOf(axis);
   return {
     role: "slider",
     tabIndex: 0,
@@ -287,8 +313,11 @@ export function Timeline(props: Props) {
   const { run, lanes, onSeek, cursor = null, signs = NOTHING, gaps = NOTHING } = props;
   const tracks: readonly Track[] = [props, ...(props.others ?? NOTHING)];
   const inside = useOpenLanes();
-  const axis = useAxis(tracks);
+  const whole = useAxis(tracks);
   const goes = tracks.some((track) => track.run.ended_at === null);
+  const isLive = goes && cursor === null;
+  const { range = null, onRange } = props;
+  const axis = useMemo(() => partOf(whole, isLive ? null : range), [whole, isLive, range]);
   const silentSince = run.ended_at === null ? (props.silentSince ?? null) : null;
   useNameColors(NAME_RANK.run, tracks.flatMap(namesIn));
   const shown = useMemo(() => openLanes(lanes, inside.open), [lanes, inside.open]);
@@ -302,8 +331,11 @@ export function Timeline(props: Props) {
       <div className={style.head}>
         <AllLevels lanes={tracks.flatMap((track) => track.lanes)} inside={inside} />
         <div ref={ruler} className={style.ruler} data-ruler {...slider}>
-          <Ticks span={axis.span} />
+          <Ticks axis={axis} />
         </div>
+        {onRange !== undefined && (
+          <Zoom whole={whole} cursor={cursor} range={range} onRange={onRange} isLive={isLive} />
+        )}
       </div>
       <Across {...{ axis, cursor, goes, silentSince, signs, gaps }} />
       <ul
@@ -327,6 +359,48 @@ export function Timeline(props: Props) {
         {overs.length > 0 && <HandOverLines overs={overs} axis={axis} lanes={shown} />}
       </ul>
     </div>
+  );
+}
+
+interface ZoomProps extends Required<Pick<Props, "cursor" | "range" | "onRange">> {
+  whole: TimeAxis;
+  isLive: boolean;
+}
+
+/** Show half of what is shown, around the chosen moment, or twice as much. */
+function Zoom({ whole, cursor, range, onRange, isLive }: ZoomProps) {
+  const { from, until } = range ?? { from: 0, until: whole.span };
+  const around = cursor === null ? (from + until) / 2 : cursor - whole.start;
+  const closer = zoomed(range, whole.span, around, 0.5);
+  const isCloser = !isLive && closer !== null && closer.until - closer.from < until - from;
+  return (
+    <span className={style.zoom}>
+      <Tooltip label={isLive ? "Zoom into the time: choose a moment first" : "Zoom into the time"}>
+        <ActionIcon
+          size={24}
+          aria-label="Zoom into the time"
+          aria-disabled={!isCloser || undefined}
+          onClick={() => isCloser && onRange(closer)}
+        >
+          <IconZoomIn size={15} aria-hidden />
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label="Zoom out of the time">
+        <ActionIcon
+          size={24}
+          aria-label="Zoom out of the time"
+          aria-disabled={isLive || range === null || undefined}
+          onClick={() => isLive || onRange(zoomed(range, whole.span, around, 2))}
+        >
+          <IconZoomOut size={15} aria-hidden />
+        </ActionIcon>
+      </Tooltip>
+      {range !== null && !isLive && (
+        <Button size="compact-xs" variant="subtle" onClick={() => onRange(null)}>
+          All
+        </Button>
+      )}
+    </span>
   );
 }
 
@@ -374,12 +448,13 @@ interface PlayheadProps {
 
 function Playhead({ axis, cursor, goes, silentSince }: PlayheadProps) {
   if (cursor !== null) {
+    if (!isOn(axis, cursor)) return null;
     const share = shareOf(axis, cursor);
     return (
       <>
         <i className={style.later} style={{ left: `${share * 100}%` }} />
         <div className={style.sweep} style={{ transform: `translateX(${share * 100}%)` }}>
-          <Cursor side={sideOf(share)} label={stopwatch(cursor - axis.start)} live={false} />
+          <Cursor side={sideOf(share)} label={stopwatch(cursor - originOf(axis))} live={false} />
         </div>
       </>
     );
