@@ -153,6 +153,7 @@ coverage: .venv/.done ## which lines of UMRF, start, Stop and runs the tests of 
 
 .PHONY: soak
 soak: setup ## tests that take longer than CI may, by the thousand (ARGS="kills images" for some of them)
+	@$(BIN)/pip install --quiet 'pyarrow>=20' # of the extra `parquet`
 	@$(BIN)/python bench/soak.py $(ARGS)
 	@test -n "$(ARGS)" || { $(BIN)/pip install --quiet atheris && $(BIN)/python tests/fuzz/soak_umrf.py 300; }
 

@@ -53,6 +53,11 @@ PARTS: Final[dict[str, Part]] = {
             *("tests/runner/repeats/test_repeats.py", "-k", "random_histories or sixty"),
         ),
     ),
+    "parquet": Part(
+        "tables as Parquet, read back with pyarrow",
+        {},
+        ("tests/runner/repeats/test_tables.py", "tests/runner/repeats/test_repeat_routes.py"),
+    ),
     "kills": Part(
         "1,000 × kill -9 of a process at 8 chosen points and at any",
         {"TEST_KILLS": "1000"},

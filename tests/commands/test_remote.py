@@ -91,6 +91,7 @@ def test_a_repeat_is_followed_listed_and_written_as_a_table(
     assert repeat in product.cli("runs", "repeats").stdout
     table = product.cli("runs", "repeats", repeat, "--csv").stdout.splitlines()
     assert len(table) == 4
+    assert "name it" in product.cli("runs", "repeats", "--parquet").stderr
     refused = product.cli("runs", "next", repeat)
     assert refused.returncode != 0
     assert "was started" in refused.stderr

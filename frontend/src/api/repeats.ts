@@ -86,7 +86,7 @@ export function reopenRepeat(
   });
 }
 
-/** Return the address of the table as a CSV file. */
-export function tableUrl(runner: string, repeat: string): string {
-  return `${runner}/api/repeats/${encodeURIComponent(repeat)}/table`;
+/** Return the address of the table as a file. */
+export function tableUrl(runner: string, repeat: string, format: "csv" | "parquet"): string {
+  return `${runner}/api/repeats/${encodeURIComponent(repeat)}/table?format=${format}`;
 }

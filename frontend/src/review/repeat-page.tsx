@@ -158,15 +158,16 @@ function Commands({ repeat, runner }: { repeat: Repeat; runner: string }) {
             Look again, and open it
           </Button>
         )}
-        <Button
-          component="a"
-          href={tableUrl(runner, id)}
-          variant="subtle"
-          leftSection={<IconDownload size={14} aria-hidden />}
-        >
-          CSV
-        </Button>
+        <TableFile href={tableUrl(runner, id, "csv")} name="CSV" />
+        {repeat.parquet && <TableFile href={tableUrl(runner, id, "parquet")} name="Parquet" />}
       </div>
+      {!repeat.parquet && (
+        <details className="quiet-12">
+          <summary>Parquet</summary>
+          For this table as Parquet, with typed columns, the Python of the runner needs pyarrow:{" "}
+          <code>pip install 'temoto-action-assistant[parquet]'</code>
+        </details>
+      )}
       {isOpen && repeat.state === "running" && (
         <p className="m-0 quiet-12">
           <b>Stop repeating</b> lets this run go on. STOP stops it, and closes the repeat.
@@ -183,6 +184,20 @@ function Commands({ repeat, runner }: { repeat: Repeat; runner: string }) {
         </p>
       )}
     </section>
+  );
+}
+
+/** Link to the table as a file of one form. */
+function TableFile({ href, name }: { href: string; name: string }) {
+  return (
+    <Button
+      component="a"
+      href={href}
+      variant="subtle"
+      leftSection={<IconDownload size={14} aria-hidden />}
+    >
+      {name}
+    </Button>
   );
 }
 

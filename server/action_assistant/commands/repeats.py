@@ -141,6 +141,11 @@ def add_repeats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     form = lists.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="as JSON, for programs")
     form.add_argument("--csv", action="store_true", help="with REPEAT: its table as CSV")
+    form.add_argument(
+        "--parquet",
+        action="store_true",
+        help="with REPEAT: its table as Parquet, for a file (> repeat.parquet)",
+    )
     lists.set_defaults(handler=_repeats)
     nexts = command(
         commands,
@@ -175,10 +180,17 @@ def add_repeats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
 
 def _repeats(options: argparse.Namespace) -> int:
     path = f"/api/repeats/{options.repeat}" if options.repeat else "/api/repeats"
-    if options.csv and not options.repeat:
-        raise CannotStart("--csv is of one repeat: name it.")
+    if (options.csv or options.parquet) and not options.repeat:
+        raise CannotStart(f"--{'csv' if options.csv else 'parquet'} is of one repeat: name it.")
+    if options.parquet and sys.stdout.isatty():
+        raise CannotStart("Parquet is no text: write it into a file (> repeat.parquet).")
     with running(options) as server:
-        answer = server.runner("GET", f"{path}/table" if options.csv else path)
+        form = "parquet" if options.parquet else "csv"
+        is_table = options.csv or options.parquet
+        answer = server.runner("GET", f"{path}/table?format={form}" if is_table else path)
+    if options.parquet:
+        sys.stdout.buffer.write(answer.content)
+        return 0
     if options.csv:
         sys.stdout.write(answer.text)
         return 0

@@ -57,6 +57,12 @@ def test_a_grid_is_carried_out_and_its_table_has_a_run_for_each_cell(
         assert [row["run"] for row in rows] == [each["run"]["id"] for each in done["cells"]]
         assert {row["Work_1.place"] for row in rows} == {"'=valve", "b"}
         assert {row["result"] for row in rows} == {"on_true"}
+        parquet = client.get(f"/api/repeats/{repeat['id']}/table", params={"format": "parquet"})
+        assert done["parquet"] == (parquet.status_code == 200)
+        if done["parquet"]:
+            assert parquet.content[:4] == parquet.content[-4:] == b"PAR1"
+        else:
+            assert (parquet.status_code, "pip install" in parquet.text) == (503, True)
         (listed,) = client.get("/api/repeats", params={"graph": "grid"}).json()
         assert listed["id"] == repeat["id"]
 

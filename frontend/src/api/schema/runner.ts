@@ -2163,7 +2163,8 @@ export interface RunnerApi {
     /**
      * RepeatShown
      * @description A repeat with its cells. `next`: the number of the cell that is started next, null after the last;
-     *     `finished`: how many runs finished; robots report no results, so that nothing else may be known.
+     *     `finished`: how many runs finished; robots report no results, so that nothing else may be known;
+     *     `parquet`: the runner can write its table as Parquet.
      */
     RepeatShown: {
         id: string;
@@ -2190,6 +2191,7 @@ export interface RunnerApi {
         next: number | null;
         finished: number;
         cells: RunnerApi["Cell"][];
+        parquet: boolean;
     };
     /**
      * RepeatSummary
@@ -4223,6 +4225,9 @@ interface RunnerOperations {
     };
     exportRepeat: {
         parameters: {
+            query?: {
+                format?: "csv" | "parquet";
+            };
             path: {
                 repeat: string;
             };

@@ -13,6 +13,7 @@ from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, b
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.run_guard import unseen_by
 from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.repeats import tables
 from action_assistant.runner.repeats.repeat import (
     MOST,
     NextRequest,
@@ -20,12 +21,12 @@ from action_assistant.runner.repeats.repeat import (
     Repeat,
     RepeatRequest,
 )
+from action_assistant.runner.repeats.results import columns_of
 from action_assistant.runner.repeats.views import (
     RepeatShown,
     RepeatSummary,
     graphs_of,
     summary_of,
-    table_of,
     view_of,
 )
 from action_assistant.runner.review.stored_runs import StoredRuns
@@ -100,14 +101,25 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/repeats/{repeat:str}/table",
         operation_id="exportRepeat",
-        summary="The table of a repeat as a CSV file, a line for each cell",
+        summary="The table of a repeat as a file: csv, or parquet where pyarrow is installed",
         guards=[Needs("see")],
         responses={200: answer(FileBytes, media="text/csv")},
     )
-    async def table(repeat: str, request: _Asking) -> Response[bytes]:
+    async def table(
+        repeat: str,
+        request: _Asking,
+        form: Annotated[tables.Format, Parameter(query="format")] = "csv",
+    ) -> Response[bytes]:
+        if form == "parquet":
+            tables.require_parquet()
         shown = await _shown(services, request, await services.repeats.find(repeat))
-        head = {"content-disposition": f'attachment; filename="repeat-{shown.id}.csv"'}
-        return Response(table_of(shown), media_type="text/csv", headers=head)
+        columns = columns_of(shown)
+        if form == "csv":
+            content = tables.csv_of(columns)
+        else:
+            content = await services.run_in_worker(tables.parquet_of, columns)
+        head = {"content-disposition": f'attachment; filename="repeat-{shown.id}.{form}"'}
+        return Response(content, media_type=tables.MEDIA[form], headers=head)
 
     return [open_, listed, one, table, *_commands(services)]
 

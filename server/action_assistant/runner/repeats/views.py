@@ -1,21 +1,18 @@
 """Repeats as people are shown them: the order, and the run of each cell."""
 
-import csv
-import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from datetime import datetime
 from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.analysis.exports import plain_cell
 from action_assistant.runner.repeats.repeat import Axis, Repeat
+from action_assistant.runner.repeats.tables import has_parquet
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sight import RunGraphs
 from action_assistant.runner.runs.views import Listed, time
 from action_assistant.safe_text import hold_names
-from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.start_values import StartValues
 
 #: `running`: a run goes on; `waiting`: for the word of a person that all is set back, which starts the
@@ -70,12 +67,14 @@ class Cell(msgspec.Struct, frozen=True, kw_only=True):
 
 class RepeatShown(RepeatSummary, frozen=True, kw_only=True):
     """A repeat with its cells. `next`: the number of the cell that is started next, null after the last;
-    `finished`: how many runs finished; robots report no results, so that nothing else may be known."""
+    `finished`: how many runs finished; robots report no results, so that nothing else may be known;
+    `parquet`: the runner can write its table as Parquet."""
 
     state: RepeatState
     next: int | None
     finished: int
     cells: list[Cell]
+    parquet: bool
 
 
 def graphs_of(repeat: Repeat) -> RunGraphs:
@@ -145,50 +144,5 @@ def view_of(repeat: Repeat, runs: Iterable[Listed]) -> RepeatShown:
         next=next_,
         finished=sum(each.state == "finished" for each in by_cell.values()),
         cells=cells,
+        parquet=has_parquet(),
     )
-
-
-def table_of(shown: RepeatShown) -> bytes:
-    """Return the table of a repeat as CSV: a line for each cell, a column for each value. A time is known
-    between two bounds; what is not known is empty."""
-    inputs = list(
-        dict.fromkeys((a, n) for cell in shown.cells for a in cell.values for n in cell.values[a])
-    )
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        [
-            *("cell", "run", "number", "state", "result", "started_by", "requested_at"),
-            *("started_at", "ended_at", "seconds_least", "seconds_most"),
-            *(plain_cell(f"{action}.{name}") for action, name in inputs),
-            *("detail", "cause"),
-        ]
-    )
-    for cell in shown.cells:
-        values = [_value(cell.values, action, name) for action, name in inputs]
-        writer.writerow([cell.cell, *_run_fields(cell.run), *values, *_words(cell.run)])
-    return out.getvalue().encode()
-
-
-def _run_fields(run: Listed | None) -> list[object]:
-    if run is None:
-        return [""] * 10
-    took = run.took
-    times = (run.requested_at, run.started_at, run.ended_at)
-    return [
-        *(run.id, run.number, run.state, run.result or "", plain_cell(run.author.name)),
-        *("" if each is None else each.isoformat() for each in times),
-        "" if took is None or took.least is None else f"{took.least:.3f}",
-        "" if took is None or took.most is None else f"{took.most:.3f}",
-    ]
-
-
-def _words(run: Listed | None) -> tuple[str, str]:
-    return ("", "") if run is None else (plain_cell(run.detail), plain_cell(run.cause))
-
-
-def _value(values: Mapping[str, Mapping[str, object]], action: str, name: str) -> str:
-    given = values.get(action, {}).get(name)
-    if given is None:
-        return ""
-    return plain_cell(given) if isinstance(given, str) else as_json(given)
