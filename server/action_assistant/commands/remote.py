@@ -92,6 +92,12 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="with --robots: wait at the breakpoints of the graph, too",
     )
     run.add_argument(
+        "--into",
+        action="store_true",
+        help="with --robots: the actions inside of sub-graphs are steps of their own; else each sub-graph "
+        "is one step",
+    )
+    run.add_argument(
         "--accept",
         nargs=2,
         metavar=("CODE,…", "REASON"),
@@ -373,6 +379,8 @@ def _run(options: argparse.Namespace) -> int:
             robots, people = options.robots or {}, options.people or {}
             order |= {"engine": "conducted", "robots": robots, "lost": options.lost}
             order |= {"people": people} if people else {}
+        if options.into:
+            order["levels"] = "opened"
         if start is not None:
             order["from"] = start
         if continued is not None:

@@ -80,6 +80,13 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     goal = steps.add_mutually_exclusive_group()
     goal.add_argument("--action", default="", metavar="NAME", help="the one of those that wait")
     goal.add_argument("--until", default="", metavar="NAME", help="all that come before this one")
+    goal.add_argument(
+        "--over",
+        default=[],
+        action="append",
+        metavar="NAME",
+        help="all inside of this opened sub-graph; again for each level down",
+    )
     _add_watching(steps)
     steps.set_defaults(handler=_step)
     add_questions(more)
@@ -130,9 +137,12 @@ def _go_on(options: argparse.Namespace) -> int:
 def _step(options: argparse.Namespace) -> int:
     """Run the command that lets one action of a held run begin, and return the exit code. Raise
     RequestRefused if it is not held, or no action waits to begin."""
-    held = _press_held(options, "step", {"action": options.action, "until": options.until})
+    wanted = {"action": options.action, "until": options.until, "over": options.over}
+    held = _press_held(options, "step", wanted)
     ready = [each["action"] for each in held.get("next", ())]
     goal = f"until {options.until}" if options.until else options.action or ready[0]
+    if options.over:
+        goal = f"over {' › '.join(options.over)}"
     print(one_line(f"one step is made: {goal}; then it waits again"))
     return 0
 

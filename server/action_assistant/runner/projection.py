@@ -159,6 +159,8 @@ def _first_summary(asked: Requested) -> dict[str, object]:
         number = 0 if asked.earlier is None else asked.earlier.number
         start = msgspec.structs.asdict(asked.start_from)
         summary |= {"from": start | {"number": number}, "sent_digest": asked.sent_digest}
+    if asked.levels is not None and asked.start_from is None:
+        summary |= {"levels": "opened", "sent_digest": asked.sent_digest}
     return summary
 
 

@@ -104,7 +104,7 @@ def breakpoints_in(graph: Graph) -> tuple[Breakpoint, ...]:
     texts += [
         (names[each.parent], ends[each.child], each.breakpoint)
         for each in graph.relations
-        if each.parent in names and each.child in ends and _goes_on(each)
+        if each.parent in names and each.child in ends and goes_on(each)
     ]
     found: dict[tuple[str, str], Breakpoint] = {}
     for action, to, text in texts:
@@ -125,7 +125,7 @@ def _kept(text: JsonText) -> _Kept | None:
         return None
 
 
-def _goes_on(arrow: Relation) -> tuple[Told, ...]:
+def goes_on(arrow: Relation) -> tuple[Told, ...]:
     """Return the outcomes by which an arrow lets its child begin, or the graph end."""
     return tuple(
         told for told, outcome in _OUTCOMES.items() if arrow.conditions.answer(outcome) in _GOES_ON
@@ -164,7 +164,7 @@ def _on_arrow(graph: Graph, each: Breakpoint, parent: str) -> Breakpoint:
     ]
     if not arrows:
         raise NoSuchPlace(f"There is no arrow from {each.action} to {each.to}.")
-    goes = {told for one in arrows for told in _goes_on(one)}
+    goes = {told for one in arrows for told in goes_on(one)}
     outcomes = tuple(
         told for told in _OUTCOMES if told in goes and (not each.outcomes or told in each.outcomes)
     )

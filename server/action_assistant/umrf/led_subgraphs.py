@@ -144,7 +144,7 @@ def _remedy(graph: Graph, inside: Inside) -> str:
     graph, if that is possible."""
     flat = flattened(graph, inside, budget=_BUDGET)
     if isinstance(flat, Flattened):
-        return "Make one graph without graphs inside of it, and start that: it does the same."
+        return "Open the sub-graphs for this start, or make one graph without graphs inside: it does the same."
     first = flat.reasons[0]
     place = f"{' › '.join(each.action for each in first.at)}: " if first.at else ""
     return (

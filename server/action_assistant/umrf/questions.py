@@ -210,7 +210,7 @@ def obstacles_of_questions(inside: Mapping[str, Graph]) -> Iterator[Obstacle]:
 def _inside(name: str, action: Action) -> str:
     return (
         f"{action.full_name} stands in the sub-graph “{name}”, which is carried out as a whole: nobody can "
-        "be asked there. Make one graph without graphs inside."
+        "be asked there. Open the sub-graphs for this start, or make one graph without graphs inside."
     )
 
 

@@ -2,11 +2,13 @@
 
 from typing import Any
 
+import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.execution.led_commands import operator_of
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.runs.earlier import StartFrom
 from action_assistant.runner.runs.views import run_view
 from action_assistant.runner.start.admission import (
     BreakpointsRequest,
@@ -163,3 +165,16 @@ async def test_the_look_says_that_a_graph_handed_over_whole_has_no_breakpoints()
         assert run.breakpoints == ()
         await control.stop(run.id, BEN)
         await ended(control, run.id)
+
+
+@virtual
+async def test_breakpoints_at_what_a_run_from_the_middle_skips_are_left_out() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    marks = (Breakpoint(action="Work_0"), Breakpoint(action="Work_1", to="Work_2"))
+    async with lab.runner() as control:
+        since = StartFrom(at=("Work_2",))
+        start = msgspec.structs.replace(task(*marks, Breakpoint(action="Work_3")), start_from=since)
+        run = (await control.start(start, ANN)).run.id
+        assert await held_at(control, run) == ("breakpoint", "Breakpoint before Work_3.")
+        await go_on(control, run)
+        assert await ended(control, run) == "finished"

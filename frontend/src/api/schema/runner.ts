@@ -31,7 +31,8 @@ export interface RunnerApi {
      * @description One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
      *     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
      *     the engine that plays it in a led run; `piece`: the id of the run of its newest piece;
-     *     `asks`: it has ended without an outcome, which a person has to give.
+     *     `asks`: it has ended without an outcome, which a person has to give; `levels`: the opened sub-graphs
+     *     that it is inside of, the outermost first.
      */
     ActionShown: {
         aid: string | null;
@@ -49,6 +50,8 @@ export interface RunnerApi {
         piece?: string;
         /** @default false */
         asks?: boolean;
+        /** @default [] */
+        levels?: string[];
     };
     /**
      * ActionStatistics
@@ -1015,6 +1018,11 @@ export interface RunnerApi {
         };
         /** @default null */
         from?: RunnerApi["StartFrom"] | null;
+        /**
+         * @default one_step
+         * @enum {string}
+         */
+        levels?: "one_step" | "opened";
     };
     /**
      * GroupShown
@@ -3051,7 +3059,8 @@ export interface RunnerApi {
      *     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
      *     version, as the editor seals them; without it, where there are rules, the run is for its starter
      *     and owners. `values`: those of inputs for which the graph asks; its digest stays that without them.
-     *     `from`: where it begins, if not at the entry.
+     *     `from`: where it begins, if not at the entry. `levels`: in a led run a sub-graph is one step, or it is
+     *     opened: the actions inside of it are steps of their own.
      */
     StartRequest: {
         version: string;
@@ -3106,6 +3115,11 @@ export interface RunnerApi {
         };
         /** @default null */
         from?: RunnerApi["StartFrom"] | null;
+        /**
+         * @default one_step
+         * @enum {string}
+         */
+        levels?: "one_step" | "opened";
     };
     /**
      * StartShown
@@ -3155,7 +3169,8 @@ export interface RunnerApi {
      * StepRequest
      * @description Lets one action of a held run begin, then holds it again. `since`, `request_id`, `watching`: as in
      *     `GoOnRequest`. `action`: the full name of the one to begin, "" for the one that has waited longest;
-     *     `until`: in place of it, all begin that come before this action.
+     *     `until`: in place of it, all begin that come before this action; `over`: in place of both, all begin
+     *     that are inside of this sub-graph, which is opened, as the `levels` of these actions name it.
      */
     StepRequest: {
         /** Format: date-time */
@@ -3170,6 +3185,8 @@ export interface RunnerApi {
         action?: string;
         /** @default  */
         until?: string;
+        /** @default [] */
+        over?: string[];
     };
     /**
      * StopBody

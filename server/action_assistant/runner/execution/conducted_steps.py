@@ -226,11 +226,12 @@ class Step:
 class StepLimit(msgspec.Struct, frozen=True):
     """Limits how far a held run goes on: `only` one action begins, the one with the full name
     `action`, or the one that has waited longest for ""; or all begin that come before the action
-    `until`. After that the run is held again."""
+    `until`, or that are inside of the opened sub-graph `over`. After that the run is held again."""
 
     only: bool = False
     action: str = ""
     until: str = ""
+    over: tuple[str, ...] = ()
 
 
 #: The limit of *Go on*.

@@ -29,8 +29,8 @@ from action_assistant.runner.start.admission import (
     StepRequest,
     WaitRequest,
     WordRequest,
-    pinned_for_text,
 )
+from action_assistant.runner.start.levels import pinned_for_text
 from action_assistant.runner.start.orders import watched_in
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.umrf.model import Precondition
@@ -111,15 +111,18 @@ class LedCommands:
     async def step(
         self, run: str, asked: StepRequest, author: Author, identity: Identity | None = None
     ) -> Run:
-        """Let one action of a held led run begin, or those before the action `asked.until`, then hold it
-        again; return the run. Raise as `go_on` does, Conflict also if no action waits to begin, BadInput
+        """Let one action of a held led run begin, or those before the action `asked.until`, or those inside
+        of the sub-graph `asked.over`, then hold it again; return the run. Raise as `go_on` does, Conflict also if no action waits to begin, BadInput
         for a name that no action has."""
-        if asked.action and asked.until:
+        if sum(map(bool, (asked.action, asked.until, asked.over))) > 1:
             raise BadInput(
-                "A step has one goal: an action, or until one.", where={"path": "/until"}
+                "A step has one goal: an action, until one, or over a sub-graph.",
+                where={"path": "/until" if asked.until else "/over"},
             )
-        limit = StepLimit(not asked.until, asked.action, asked.until)
-        press = step_press(author, microseconds(asked.since), asked.action, asked.until)
+        is_one = not (asked.until or asked.over)
+        limit = StepLimit(is_one, asked.action, asked.until, asked.over)
+        since = microseconds(asked.since)
+        press = step_press(author, since, asked.action, asked.until, asked.over)
         return await self._go_on_once(run, asked, author, identity, press, limit)
 
     async def wait(self, run: str, asked: WaitRequest, author: Author) -> Run:

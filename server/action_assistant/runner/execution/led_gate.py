@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.conducted_steps import (
+    UNLIMITED,
     Gate,
     GoOn,
     LeftOpen,
@@ -79,7 +80,8 @@ class LedGate(Gate):
         self._noted: set[int] = set()  # those of which that is recorded
         self._let: Step | None = None  # the only step that may pass, since a person let it
         self._let_by: Author | None = None
-        self._until = ""  # the action before which the run is held again
+        self._limit = UNLIMITED  # how far it goes on, if not for one step
+        self._levels = first.levels or {}
         #: Where the run waits, as its start or a person has set it.
         self.breakpoints = first.breakpoints
         self._calls: dict[str, set[int]] = {}  # that have begun so far, by full name of the action
@@ -116,7 +118,7 @@ class LedGate(Gate):
             return
         self.hold(held)
         self.on_hold()
-        self._let, self._let_by, self._until = None, None, ""
+        self._let, self._let_by, self._limit = None, None, UNLIMITED
         self._tell(held, author)
         for step in self._ready.values():
             self._note_waiting(step)
@@ -154,8 +156,11 @@ class LedGate(Gate):
         self._calls.setdefault(step.node, set()).add(step.call.number)
         if step is self._let or (self.held is not None and self.held.how == "trouble"):
             return
-        if self.is_open and step.node == self._until:
-            why = f"It went on until {step.node}, which waits to begin."
+        if self.is_open and self._ends_at(step):
+            over = " › ".join(self._limit.over)
+            why = f"It went over {over}: {step.node} waits to begin."
+            if not over:
+                why = f"It went on until {step.node}, which waits to begin."
             self.hold_run(why, self._let_by, how="step", node=step.node)
         call = step.call
         for each in self.breakpoints:
@@ -168,6 +173,15 @@ class LedGate(Gate):
             if each.holds(self.visit(call), call.inputs):
                 self._reached.add((each.action, call.number))
                 self.hold_run(f"Breakpoint {each.words()}.", how="breakpoint", node=step.node)
+
+    def _ends_at(self, step: Step) -> bool:
+        """Return whether the run goes on only until this step is about to begin."""
+        limit = self._limit
+        return step.node == limit.until or (bool(limit.over) and not self._is_in(step, limit.over))
+
+    def _is_in(self, step: Step, over: tuple[str, ...]) -> bool:
+        """Return whether the action of a step is inside of this opened sub-graph."""
+        return self._levels.get(step.node, ())[: len(over)] == over
 
     def take_up(self, left: LeftOpen) -> None:
         """Continue with the visits and breakpoints of a run that an earlier process left."""
@@ -213,6 +227,8 @@ class LedGate(Gate):
             if name and name not in self._first.actions:
                 raise BadInput(f"{name} is no action of this run.", where={"path": path})
         ready = [self._ready[call] for call in sorted(self._ready)]
+        if limit.over:
+            self._require_over(limit.over, ready)
         if limit.until in {step.node for step in ready}:
             text = f"{limit.until} waits to begin already: let it begin by a step."
             raise Conflict(text, where={"path": "/until"})
@@ -224,6 +240,18 @@ class LedGate(Gate):
         names = ", ".join(f"{step.node} on {step.engine}" for step in ready)
         what = f"Only {names} waits to begin." if names else "No action waits to begin now."
         raise Conflict(f"No step was made. {what}", where={"path": "/action"})
+
+    def _require_over(self, over: tuple[str, ...], ready: list[Step]) -> None:
+        """Raise BadInput if the run has opened no such sub-graph; Conflict if no action inside of it waits
+        to begin, or another one does."""
+        where: dict[str, object] = {"path": "/over"}
+        name = " › ".join(over)
+        if all(levels[: len(over)] != over for levels in self._levels.values()):
+            raise BadInput(f"{name} is no sub-graph that this run has opened.", where=where)
+        outside = ", ".join(step.node for step in ready if not self._is_in(step, over))
+        if outside or not ready:
+            what = f"{outside} waits to begin" if outside else "No action waits to begin now"
+            raise Conflict(f"No step was made. {what}.", where=where)
 
     def why_not_allowed(self, robot: str) -> str:
         """Return the reason why the person for whom the run is led may begin nothing on a robot
@@ -280,7 +308,7 @@ class LedGate(Gate):
             if why:
                 raise Conflict(f"Nothing has gone on. {why}", where={"path": "/robots"})
         self.person, self.claim = lead, claim
-        self._let, self._let_by, self._until = step, press.author, press.limit.until
+        self._let, self._let_by, self._limit = step, press.author, press.limit
         released = Released(
             at=self._clock_us(),
             author=press.author,
@@ -289,6 +317,7 @@ class LedGate(Gate):
             watching=press.watching,
             step=step.node if step is not None else "",
             until=press.limit.until,
+            over=press.limit.over,
         )
         self._tell(released, press.author.id)
         self.release()

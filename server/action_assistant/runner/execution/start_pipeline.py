@@ -275,6 +275,7 @@ def _to_store(
         limits=dict(ready.limits),
         earlier=None if begins is None else begins.earlier,
         before=None if begins is None else begins.before,
+        levels=ready.levels,
     )
     targets = () if accepted.is_simulated or accepted.led else (request.engine,)
     graph = GraphOutline(ready.name, ready.actions)

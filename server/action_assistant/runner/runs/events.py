@@ -142,6 +142,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     start_from: StartFrom | None = None  # where it begins, if not at the entry
     earlier: Earlier | None = None  # all that it takes for granted then
     before: Before | None = None  # the course of the run that it continues
+    #: The sub-graphs around each action, outermost first, where these are opened; else None.
+    levels: dict[str, tuple[str, ...]] | None = None
     repeat: PartOfRepeat | None = None  # of which it is a cell
     limits: dict[str, tuple[Limit, ...]] = {}  # in force on its robots at the start
     pages: dict[str, PagePresence] = {}  # the rules about visible pages there
@@ -488,7 +490,8 @@ class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A person let a held run go on. `since`: when it was held; 0 in events of earlier versions;
     `request_id`: names the press, "" where the caller gave none. `watching`: the robots that they said
     to watch. `step`: the only action that may begin, after which the run is held again, "" for no such
-    limit; `until`: the action before which it is held again, "" for none."""
+    limit; `until`: the action before which it is held again, "" for none; `over`: it is held again before
+    any action outside of this opened sub-graph."""
 
     kind: ClassVar[str] = "run.released.v1"
 
@@ -499,6 +502,7 @@ class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     watching: tuple[str, ...] = ()
     step: str = ""
     until: str = ""
+    over: tuple[str, ...] = ()
 
 
 class HandedOver(msgspec.Struct, frozen=True, kw_only=True):

@@ -129,13 +129,18 @@ def begin(event: Requested) -> Run:
     asked = event.led.asked if event.led is not None else {}
     players = players | {name: each.by for name, each in asked.items()}
     once, joined = frozenset(known.once), frozenset(known.barring_errors)
+    levels = event.levels or {}
     return Run(
         **{name: getattr(event, name) for name in _AS_REQUESTED},
         id=event.run,
         requested_at=event.at,
         actions={
             name: ActionRun(
-                aid=aid, once=name in once, joined=name in joined, robot=players.get(name, "")
+                aid=aid,
+                once=name in once,
+                joined=name in joined,
+                robot=players.get(name, ""),
+                levels=levels.get(name, ()),
             )
             for name, aid in event.actions.items()
         },
@@ -205,9 +210,11 @@ def follow(run: Run, event: RunEvent) -> Run:
             return replace(run, breakpoints=event.breakpoints)
         case PieceWaits():
             return replace(run, waits=run.waits | {event.call: (event.node, event.engine)})
-        case Released(author=by, since=since, step=step, until=until):
-            is_limited = bool(step or until)
-            press = step_press(by, since, step, until) if is_limited else go_on_press(by, since)
+        case Released(author=by, since=since, step=step, until=until, over=over):
+            is_limited = bool(step or until or over)
+            press = (
+                step_press(by, since, step, until, over) if is_limited else go_on_press(by, since)
+            )
             return with_press(replace(run, held=None, lead=by), event.request_id, press)
         case HandedOver():
             return replace(run, lead=event.to)

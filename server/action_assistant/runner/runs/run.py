@@ -129,10 +129,13 @@ def go_on_press(by: Author, since: int) -> Press:
     return Press(by.id, ("go on", str(since)))
 
 
-def step_press(by: Author, since: int, action: str, until: str) -> Press:
+def step_press(
+    by: Author, since: int, action: str, until: str, over: tuple[str, ...] = ()
+) -> Press:
     """Return the record of a person's press of *Step*, for a led run that was held at `since`
-    (microseconds UTC). `action`: the one to begin; `until`: the one before which it waits again."""
-    return Press(by.id, ("step", str(since), action, until))
+    (microseconds UTC). `action`: the one to begin; `until`: the one before which it waits again;
+    `over`: the sub-graph after which it waits again."""
+    return Press(by.id, ("step", str(since), action, until, "\n".join(over)))
 
 
 def wait_press(by: Author) -> Press:

@@ -156,7 +156,8 @@ class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     """One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
     the engine that plays it in a led run; `piece`: the id of the run of its newest piece;
-    `asks`: it has ended without an outcome, which a person has to give."""
+    `asks`: it has ended without an outcome, which a person has to give; `levels`: the opened sub-graphs
+    that it is inside of, the outermost first."""
 
     aid: str | None
     state: str
@@ -168,6 +169,7 @@ class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     robot: str = ""
     piece: str = ""
     asks: bool = False
+    levels: tuple[str, ...] = ()
 
 
 class AlarmShown(msgspec.Struct, frozen=True):
@@ -665,6 +667,7 @@ def _action_view(
         action.robot,
         action.piece,
         asks,
+        action.levels,
     )
 
 

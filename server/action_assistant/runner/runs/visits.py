@@ -166,7 +166,8 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     `doubted`: the present state is of feedback that may be older than the last answer; it may
     contradict `visits` until the next one. `call`: the number of the call that the last visit is,
     in a led run; `robot`: the engine that plays the action there; `piece`: the id of its newest
-    piece. `answers`, `feedback`: the changes that each has shown.
+    piece. `answers`, `feedback`: the changes that each has shown. `levels`: the opened sub-graphs that
+    it is inside of, the outermost first.
     """
 
     aid: str | None = None
@@ -190,6 +191,7 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     piece: str = ""
     answers: Changes = Changes()
     feedback: tuple[Changes, ...] = ()
+    levels: tuple[str, ...] = ()
 
     @property
     def proven(self) -> int:

@@ -31,14 +31,16 @@ from action_assistant.runner.start.casting import (
     require_same_robots,
     without_preset,
 )
+from action_assistant.runner.start.levels import opened_levels, pinned_in
 from action_assistant.runner.start.piece_texts import PieceText, texts_of
 from action_assistant.runner.start.start_from import Beginning, EarlierRun, beginning
-from action_assistant.umrf.breakpoints import Breakpoint, NoSuchPlace, pinned
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.check import blocking, check, forbids_start, is_final
 from action_assistant.umrf.checks.actors import led_problems
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.hierarchy.opening import Levels
 from action_assistant.umrf.kept_values import receiving, value_arrows
 from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.led_steps import as_one_step
@@ -88,6 +90,9 @@ _PressId = Annotated[str, msgspec.Meta(max_length=200)]
 _NameText = Annotated[str, msgspec.Meta(max_length=1000)]
 Breakpoints = Annotated[tuple[Breakpoint, ...], msgspec.Meta(max_length=200)]
 
+#: What sub-graphs are in a led run.
+SubGraphs: TypeAlias = Literal["one_step", "opened"]
+
 #: Who answers the questions of a graph, by actor.
 People: TypeAlias = Annotated[dict[_NameText, _NameText], msgspec.Meta(max_length=100)]
 
@@ -119,7 +124,8 @@ class StartRequest(
     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
     version, as the editor seals them; without it, where there are rules, the run is for its starter
     and owners. `values`: those of inputs for which the graph asks; its digest stays that without them.
-    `from`: where it begins, if not at the entry.
+    `from`: where it begins, if not at the entry. `levels`: in a led run a sub-graph is one step, or it is
+    opened: the actions inside of it are steps of their own.
     """
 
     version: str
@@ -143,6 +149,7 @@ class StartRequest(
     breakpoints: Breakpoints = ()
     values: StartValues = {}
     start_from: StartFrom | None = None
+    levels: SubGraphs = "one_step"
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -158,13 +165,15 @@ class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class StepRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Lets one action of a held run begin, then holds it again. `since`, `request_id`, `watching`: as in
     `GoOnRequest`. `action`: the full name of the one to begin, "" for the one that has waited longest;
-    `until`: in place of it, all begin that come before this action."""
+    `until`: in place of it, all begin that come before this action; `over`: in place of both, all begin
+    that are inside of this sub-graph, which is opened, as the `levels` of these actions name it."""
 
     since: datetime
     request_id: _PressId = ""
     watching: Watching = {}
     action: _NameText = ""
     until: _NameText = ""
+    over: Annotated[tuple[_NameText, ...], msgspec.Meta(max_length=40)] = ()
 
 
 class WaitRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -232,6 +241,7 @@ class GroupRequest(
     breakpoints: Breakpoints = ()
     values: StartValues = {}
     start_from: StartFrom | None = None
+    levels: SubGraphs = "one_step"
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -258,6 +268,7 @@ class GroupRequest(
             breakpoints=self.breakpoints,
             values=self.values,
             start_from=self.start_from,
+            levels=self.levels if engine == CONDUCTED else "one_step",
         )
 
 
@@ -276,7 +287,8 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     """A start whose graph passed all checks. `graph`: with the values of the start, `sent_digest` its
     digest; `digest`: that of the version. `problems`: warnings, and those that forbid a start and are
     overridden. `beyond`: values, or a part that is played alone, change what the version itself says.
-    `beginning`: where it begins, None for the entry."""
+    `beginning`: where it begins, None for the entry; `levels`: the sub-graphs around each action, if
+    these are opened: then `inside` is empty."""
 
     graph: Graph
     graph_id: str | None
@@ -289,6 +301,7 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     sent_digest: str = ""
     beyond: bool = False
     beginning: Beginning | None = None
+    levels: dict[str, Levels] | None = None
 
 
 class Prepared(msgspec.Struct, frozen=True, kw_only=True):
@@ -297,7 +310,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
     `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one; `handing`:
     the arrows by which these hand values to others. `digest`, `tree_digest`: of the version;
-    `sent_digest`, `beyond`, `beginning`: as of `Admitted`, the last without its graph. `limits`: those
+    `sent_digest`, `beyond`, `beginning`, `levels`: as of `Admitted`, `beginning` without its graph. `limits`: those
     in force on its robots, to which all of it was held; `over`: what is outside of them."""
 
     run: str
@@ -318,6 +331,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     sent_digest: str = ""
     beyond: bool = False
     beginning: Beginning | None = None
+    levels: dict[str, Levels] | None = None
     limits: Limits = {}
     over: tuple[OverLimit, ...] = ()
 
@@ -374,12 +388,22 @@ def admit(
     )
     _check_size(text, reading.graph, subgraphs, inside)
     begins = _beginning(request, reading.graph, tree_of(found, subgraphs), earlier)
+    levels = begins.levels if begins is not None else None
     if begins is None:
         graph = _given(reading.graph, request.values)
-        problems = [*reading.problems, *reading.placed(check(graph, None, facts, inside))]
     else:
         graph = begins.graph if begins.before else _given(begins.graph, request.values)
-        problems = [*reading.problems, *check(graph, None, facts, inside)]
+    if request.levels == "opened":
+        is_whole = begins is None and request.engine == CONDUCTED
+        graph, levels = opened_levels(graph, inside, is_whole=is_whole)
+        _check_size(codec.write(graph).encode(), graph, (), {})
+    inside = inside if levels is None else {}
+    found_problems = check(graph, None, facts, inside)
+    is_whole = begins is None and levels is None
+    problems = [
+        *reading.problems,
+        *(reading.placed(found_problems) if is_whole else found_problems),
+    ]
     if request.engine != CONDUCTED and any(map(is_asked, graph.actions)):
         require_nobody_asked(graph, request.engine, _script(request)[0])
     _check_problems(problems, request.override)
@@ -390,9 +414,12 @@ def admit(
         script=script,
         script_text=script_text,
         digest=found,
-        sent_digest=digest(graph) if request.values or begins is not None else found,
-        beyond=_is_beyond(reading.graph, request.values) or (begins is not None and begins.is_part),
+        sent_digest=digest(graph) if request.values or not is_whole else found,
+        beyond=_is_beyond(reading.graph, request.values)
+        or levels is not None
+        or (begins is not None and begins.is_part),
         beginning=begins,
+        levels=levels,
         problems=tuple(problems),
         subgraphs=subgraphs,
         inside=inside,
@@ -434,6 +461,7 @@ def prepared(
         beyond=admitted.beyond,
         beginning=admitted.beginning
         and msgspec.structs.replace(admitted.beginning, graph=Graph(name=graph.name)),
+        levels=admitted.levels,
         limits=limits,
         over=_over(limits.get(request.engine, ()), inputs_of(graph, admitted.inside)),
     )
@@ -578,7 +606,8 @@ def prepared_pieces(
     its robots."""
     whole = prepared(request, facts, run, approved=approved, earlier=earlier)
     whole = msgspec.structs.replace(whole, limits=limits)
-    graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
+    graph = codec.read(whole.umrf).graph
+    inside = graphs_in(whole.subgraphs) if whole.levels is None else {}
     for_robots = without_asked(graph)
     actors = actors_in(for_robots, inside)
     if whole.beginning is not None:  # what is skipped needs no robot
@@ -588,7 +617,8 @@ def prepared_pieces(
     people = people_of(graph, request.people, is_part=whole.beginning is not None)
     if whole.beginning is not None and whole.beginning.before is not None:
         require_same_robots(request.robots, earlier)
-    breakpoints = pinned_in(graph, request.breakpoints)
+    skipped = whole.beginning.earlier.skipped if whole.beginning is not None else ()
+    breakpoints = pinned_in(graph, request.breakpoints, skipped=skipped, levels=whole.levels)
     hindering = (
         *obstacles_of_questions(inside),
         *subgraph_obstacles(for_robots, inside, request.robots),
@@ -626,20 +656,6 @@ def prepared_pieces(
         people=people,
         asked=asked,
     )
-
-
-def pinned_in(graph: Graph, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:
-    """Return the breakpoints for a run of a graph. Raise BadInput for one that has no place there."""
-    try:
-        return pinned(graph, breakpoints)
-    except NoSuchPlace as why:
-        raise BadInput(str(why), where={"path": "/breakpoints"}) from why
-
-
-def pinned_for_text(umrf: str, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:
-    """Return the breakpoints for a run of the graph in a UMRF text. For workers. Raise BadInput for one
-    that has no place there."""
-    return pinned_in(codec.read(umrf).graph, breakpoints)
 
 
 def _part_of(

@@ -84,7 +84,8 @@ class IdempotentStarts:
         other_robots = (wanted, request.lost) != (robots, row.summary.get("lost", request.lost))
         other = (row.digest, row.engine) != (request.digest, request.engine)
         other_values = request.values != msgspec.convert(row.summary.get("values", {}), StartValues)
-        if other or other_tree or other_robots or other_values or other_start:
+        other_levels = request.levels != row.summary.get("levels", "one_step")
+        if other or other_tree or other_robots or other_values or other_start or other_levels:
             raise Conflict(
                 "This request_id belongs to another start.", where={"path": "/request_id"}
             )

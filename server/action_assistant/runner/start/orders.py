@@ -46,8 +46,8 @@ def order_of(
 ) -> str:
     """Return the digest of everything that a second person says yes to: the version (`tree_digest`), and
     where there are any, the values, the robots of a led run with what happens when one is lost, the
-    overridden `codes`, the `limits` in force on its robots, and where it begins: the record of an earlier
-    run, which is over, does not change. That of a start with nothing besides its graph is the tree digest."""
+    overridden `codes`, the `limits` in force on its robots, that its sub-graphs are opened, and where it
+    begins: the record of an earlier run, which is over, does not change. That of a start with nothing besides its graph is the tree digest."""
     more: dict[str, Any] = {}
     if request.values:
         more["values"] = msgspec.to_builtins(request.values)
@@ -61,6 +61,8 @@ def order_of(
         more["limits"] = msgspec.to_builtins(limits)
     if request.start_from is not None:
         more["from"] = msgspec.to_builtins(request.start_from)
+    if request.levels != "one_step":
+        more["levels"] = request.levels
     if not more:
         return tree_digest
     return hashlib.sha256(rfc8785.dumps([tree_digest, more])).hexdigest()

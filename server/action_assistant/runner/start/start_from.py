@@ -26,13 +26,14 @@ class EarlierRun(msgspec.Struct, frozen=True):
 class Beginning(msgspec.Struct, frozen=True, kw_only=True):
     """The beginning of a start. `graph`: what it plays; `earlier`: what it takes for granted; `before`: the
     course of the run that it continues; `lacks`: why it cannot begin, "" if it can; `is_part`: the
-    graph is a part of the version."""
+    graph is a part of the version; `levels`: the opened sub-graphs of the run that it continues."""
 
     graph: Graph
     earlier: Earlier
     before: Before | None = None
     lacks: str = ""
     is_part: bool = False
+    levels: dict[str, tuple[str, ...]] | None = None
 
 
 def beginning(
@@ -91,6 +92,7 @@ def _continued(before: EarlierRun, tree: str, values: StartValues) -> Beginning:
         before=ending.before,
         lacks=ending.lacks,
         is_part=first.beyond,
+        levels=first.levels,
     )
 
 

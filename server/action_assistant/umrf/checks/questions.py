@@ -23,7 +23,8 @@ def check_questions(subject: Subject, graphs: SubGraphs) -> None:
         if action.name in graphs.by_name and (inner := _asked_inside(action.name, graphs)):
             message = (
                 f"In the sub-graph “{action.name}”, {inner} asks people, or waits for a time. A sub-graph is "
-                "carried out as a whole, so nobody can be asked there: make one graph without graphs inside."
+                "carried out as a whole, so nobody can be asked there: open the sub-graphs at the start, "
+                "or make one graph without graphs inside."
             )
             subject.report("question-inside", "error", message, action=action, member="/name")
     facts = subject.facts
