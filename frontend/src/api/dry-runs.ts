@@ -9,10 +9,13 @@ export type TraceEvent = DryRunResult["trace"][number];
 export type Behaviour = EditorApi["Behaviour"];
 export type Script = EditorApi["Script"];
 export type Command = EditorApi["Command"];
+/** The actions with which a dry-run begins, if not at the entry; `only`: it plays nothing else. */
+export type DryRunPart = EditorApi["RehearsedPart"];
 export type DryRunRequest = Required<
   Pick<EditorApi["Rehearsing"], "script" | "commands" | "values">
 > & {
   seq: number;
+  from?: DryRunPart;
 };
 
 /** Plays the moment `seq`; null while nobody wants to see it. The last answer stays until the next. */

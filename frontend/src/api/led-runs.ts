@@ -14,6 +14,8 @@ export interface LedOrder {
   readonly lost: "stop" | "wait";
   /** The group or person that answers the questions of each role; "" for all who may run it. */
   readonly people?: Readonly<Record<string, string>>;
+  /** Set if sub-graphs are opened: the actions inside of them are steps of their own. */
+  readonly levels?: "opened";
 }
 
 /** Return the engines that carry out a run, sorted: one, or all those of a led run. */

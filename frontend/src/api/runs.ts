@@ -257,7 +257,10 @@ export function letGoOn(
 }
 
 /** The distance that a held run goes on: one action, or all that come before another one. */
-export type StepGoal = { readonly action: string } | { readonly until: string };
+export type StepGoal =
+  | { readonly action: string }
+  | { readonly until: string }
+  | { readonly over: string[] };
 
 /** Let a held run go on so far, if it is still held since this moment, and hold it again. */
 export function letStep(

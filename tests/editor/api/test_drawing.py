@@ -62,6 +62,18 @@ def test_people_can_press_stop_in_a_rehearsal(editor: Editor) -> None:
         assert states[-1] == "STOPPED"
 
 
+def test_a_rehearsal_begins_in_the_middle_or_plays_only_some_actions(editor: Editor) -> None:
+    with editor.client() as http:
+        graph = imported(http)["id"]
+        assert results(rehearse(http, graph, **{"from": {"at": ["Back_0"]}})) == [
+            ("Back_0", "on_true")
+        ]
+        only = {"at": ["Go_0"], "only": True}
+        assert results(rehearse(http, graph, **{"from": only})) == [("Go_0", "on_true")]
+        refused = http.post(f"/api/graphs/{graph}/rehearsal", json={"from": {"at": ["Fly_0"]}})
+        assert assert_problem(refused, 400)["where"] == {"path": "/from/at"}
+
+
 def test_a_rehearsal_without_end_is_cut(editor: Editor) -> None:
     loop = json.loads(json.dumps(NAV))
     loop["actions"][1]["children"] = [{"name": "Go", "instance_id": 0}]

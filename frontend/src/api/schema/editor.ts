@@ -2114,10 +2114,20 @@ export interface EditorApi {
         asked: EditorApi["AskedInput"][];
     };
     /**
+     * RehearsedPart
+     * @description The part of a graph that is simulated: the actions `at`, by full name, and all that may follow, or
+     *     `only` these.
+     */
+    RehearsedPart: {
+        at: string[];
+        /** @default false */
+        only?: boolean;
+    };
+    /**
      * Rehearsing
      * @description A request to simulate the graph after its change `seq` (missing: the newest). `script`: what
      *     its actions do, as in a script of `simulate`; `commands`: what people do during the run;
-     *     `values`: those of inputs for which a start asks.
+     *     `values`: those of inputs for which a start asks; `from`: where it begins, if not at the entry.
      */
     Rehearsing: {
         /** @default null */
@@ -2134,6 +2144,8 @@ export interface EditorApi {
                 [key: string]: boolean | number | string | (boolean | number | string)[];
             };
         };
+        /** @default null */
+        from?: EditorApi["RehearsedPart"] | null;
     };
     /**
      * RelationChange

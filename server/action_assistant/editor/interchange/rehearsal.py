@@ -17,6 +17,7 @@ from action_assistant.umrf import semantics
 from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.partial_runs import NoPart, partial_graph
 from action_assistant.umrf.start_values import (
     AskedInput,
     StartValues,
@@ -37,16 +38,27 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     verb: Literal["stop", "pause", "resume"]
 
 
-class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class RehearsedPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The part of a graph that is simulated: the actions `at`, by full name, and all that may follow, or
+    `only` these."""
+
+    at: Annotated[tuple[str, ...], msgspec.Meta(min_length=1, max_length=200)]
+    only: bool = False
+
+
+class Rehearsing(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"start_from": "from"}
+):
     """A request to simulate the graph after its change `seq` (missing: the newest). `script`: what
     its actions do, as in a script of `simulate`; `commands`: what people do during the run;
-    `values`: those of inputs for which a start asks."""
+    `values`: those of inputs for which a start asks; `from`: where it begins, if not at the entry."""
 
     seq: int | None = None
     script: Annotated[Any, semantics.SCRIPT] = None
     commands: tuple[Command, ...] = ()
     for_ms: float = HOUR_MS
     values: StartValues = {}
+    start_from: RehearsedPart | None = None
 
 
 class Rehearsal(msgspec.Struct, frozen=True):
@@ -68,10 +80,19 @@ def rehearsed(sight: GraphAtSeq, wanted: Rehearsing, inside: Inside = NOTHING_IN
         raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
     if len(wanted.commands) > 100:
         raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
-    graph = read(sight).moment.graph
+    graph = _part(read(sight).moment.graph, wanted.start_from)
     filled = _given(graph, wanted.values)
     found = _played(sight.seq, filled, graphs_of(inside), script, wanted)
     return msgspec.json.encode(msgspec.structs.replace(found, asked=asked_inputs(graph)))
+
+
+def _part(graph: Graph, wanted: RehearsedPart | None) -> Graph:
+    if wanted is None:
+        return graph
+    try:
+        return partial_graph(graph, wanted.at, {}, only=wanted.only).graph
+    except NoPart as error:
+        raise BadInput(str(error), where={"path": "/from/at"}) from error
 
 
 def _given(graph: Graph, values: StartValues) -> Graph:
