@@ -178,3 +178,105 @@ test("on the canvas of a run people let it wait at an action and an arrow, and g
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
   await expect(at("Lift 0")).toBeHidden();
 });
+
+test("a step goes into a sub-graph that is opened, and over it", async () => {
+  const { page } = ada;
+  const inner = ["Reach", "Close"].map((name) => ({ name, instance_id: 0 }));
+  const two = inner.map((each, i) => ({
+    ...{ ...each, type: "sync" },
+    ...{ parents: inner.slice(0, i), children: inner.slice(i + 1) },
+  }));
+  const headers = { "content-type": "application/json" };
+  const ends = { graph_entry: inner.slice(0, 1), graph_exit: inner.slice(1) };
+  const body = JSON.stringify({ graph_name: "Grip", ...ends, actions: two });
+  await product.ask("/api/graphs", { method: "POST", body, headers });
+  await page.goto(`${product.url}/graphs/${await line("nested", 3)}`);
+  await saved(page);
+  await card(page, "Grip").click({ position: { x: 40, y: 24 } });
+  await page.keyboard.press("F9");
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await dialog(page)
+    .getByRole("radio", { name: /^Opened/ })
+    .click();
+  const start = dialog(page).getByRole("button", { name: /^Run v\d+, step by step, in/ });
+  await expect(start).toBeEnabled({ timeout: 15_000 });
+  await page.screenshot({ path: "test-results/opened-1440.png" });
+  await holdEnter(page, start);
+
+  const step = (name: string) =>
+    waits(page).getByRole("button", { name: `Let only ${name} on the simulator begin` });
+  await expect(waits(page)).toContainText("Breakpoint before Reach", { timeout: 15_000 });
+  await holdEnter(page, step("Grip 0 › Reach 0"));
+  await expect(step("Grip 0 › Close 0")).toBeVisible({ timeout: 15_000 });
+  await page.screenshot({ path: "test-results/over-1440.png" });
+  await holdEnter(page, waits(page).getByRole("button", { name: /^Let all inside of .?Grip 0/ }));
+  await expect(waits(page)).toContainText("It went over Grip_0: Lift_0 waits to begin", {
+    timeout: 15_000,
+  });
+  await page.getByRole("button", { name: /^Stop/ }).first().click();
+  await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
+});
+
+test("a dry-run begins at an action, or plays nothing else", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${await line("middle", 3)}`);
+  await saved(page);
+  const bar = page.getByRole("region", { name: "Dry-run" });
+  await card(page, "Grip").click({ button: "right", position: { x: 40, y: 24 } });
+  await page.getByRole("menuitem", { name: "Dry-run from here" }).click();
+  await expect(bar).toContainText(/from .?Grip.?; what is skipped counts as ended/);
+  await expect(card(page, "Grip")).toContainText("running");
+  await expect(card(page, "Drive")).not.toContainText("running");
+  await page.screenshot({ path: "test-results/dry-run-from-1440.png" });
+});
+
+test("the canvas of a run has a menu by keys, mouse and finger: wait, go on until here, run from here", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${await line("menu", 4)}`);
+  await saved(page);
+  await card(page, "Grip").click({ position: { x: 40, y: 24 } });
+  await page.keyboard.press("F9");
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  const start = dialog(page).getByRole("button", { name: /^Run v\d+, step by step, in/ });
+  await expect(start).toBeEnabled({ timeout: 15_000 });
+  await holdEnter(page, start);
+  await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });
+  const [run] = await runs();
+  await page.goto(`${product.url}/runs/${run?.id}`);
+  const menu = page.getByRole("dialog", { name: "What can be done here" });
+
+  await card(page, "Look").focus();
+  await page.keyboard.press("Shift+F10");
+  await menu.getByRole("button", { name: /^Let run \d+ wait at Look 0$/ }).click();
+  await expect(card(page, "Look").locator("[data-breakpoint]")).toBeVisible();
+  await page.screenshot({ path: "test-results/run-menu-1440.png" });
+  await page.keyboard.press("Escape");
+  await expect(menu).toBeHidden();
+  await card(page, "Lift").click({ button: "right", position: { x: 40, y: 24 } });
+  await expect(menu.getByRole("button", { name: /go on until Lift 0/ })).toBeEnabled();
+  await page.keyboard.press("Escape");
+
+  await page.setViewportSize({ width: 360, height: 740 });
+  await page.reload(); // the view fits the graph once
+  await expect(card(page, "Lift")).toBeInViewport();
+  const box = await card(page, "Lift").boundingBox();
+  const at = { clientX: (box?.x ?? 0) + 20, clientY: (box?.y ?? 0) + 15 };
+  const finger = { pointerId: 9, pointerType: "touch", bubbles: true, ...at };
+  await card(page, "Lift").dispatchEvent("pointerdown", finger);
+  await expect(menu).toBeVisible();
+  await card(page, "Lift").dispatchEvent("pointerup", finger);
+  await page.screenshot({ path: "test-results/run-menu-360.png" });
+  await holdEnter(page, menu.getByRole("button", { name: /go on until Lift 0/ }));
+  await expect(waits(page)).toContainText("It went on until Lift_0", { timeout: 15_000 });
+  await page.keyboard.press("Escape");
+  await page.setViewportSize({ width: 1440, height: 900 });
+
+  await page.getByRole("button", { name: /^Stop/ }).first().click();
+  await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
+  await card(page, "Look").focus();
+  await page.keyboard.press("Shift+F10");
+  await menu.getByRole("button", { name: /^Run from .?Look 0.? …$/ }).click();
+  await expect(dialog(page)).toContainText(/Run from .?Look/);
+});

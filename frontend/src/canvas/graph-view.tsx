@@ -1,14 +1,16 @@
 /** A read-only canvas, as run pages and comparisons show it. */
 import { Background, BackgroundVariant, ReactFlow, type Viewport } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useState } from "react";
-import type { Graph, Key } from "../graph/model";
+import type { Graph, Key, Position } from "../graph/model";
 import { robotNames } from "../graph/robots";
 import type { Progress } from "../status/progress";
 import { NAME_RANK, useNameColors } from "../ui/name-colors";
 import { LineContext, LineStore } from "./arrows/line-store";
 import { type Arrow, type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
 import { useLaidOut } from "./geometry/layout";
+import { arrowAt, nodeAt } from "./hit-test";
 import { NO_PROBLEM_MARKS } from "./marks/problem-marks";
+import { menuKeyTarget, useMenuPress } from "./menu-press";
 import { edgeTypes, nodeTypes } from "./node-types";
 import { notePlaces } from "./notes/note-nodes";
 import { ArrowTips } from "./outcome-arrow";
@@ -26,6 +28,8 @@ interface Props {
   onSelect?: (key: Key | null) => void;
   /** Called with the id of a relation; without it arrows cannot be chosen. */
   onSelectArrow?: ((id: string) => void) | undefined;
+  /** Called with the id of an action or relation whose menu is wanted, and the place for it. */
+  onMenu?: ((id: string, screen: Position) => void) | undefined;
   /** Distinguishes several canvases on one page. */
   id?: string;
   /** Another canvas moves its view, so it does not fit the graph by itself. */
@@ -57,6 +61,11 @@ export function GraphView(props: Props) {
     () => edgesOf(graph, options, surroundingsOf(graph, null)),
     [graph, options],
   );
+  const { onMenu } = props;
+  const press = useMenuPress((screen) => {
+    const id = nodeAt(screen) ?? arrowAt(screen);
+    if (id !== null) onMenu?.(id, screen);
+  });
   const [lines] = useState(() => new LineStore());
   useEffect(() => lines.show(sceneOf(graph, options, lines.offset)), [lines, graph, options]);
   useEffect(() => () => lines.close(), [lines]);
@@ -88,6 +97,13 @@ export function GraphView(props: Props) {
         }}
         onNodeClick={(_, node) => onSelect?.(node.type === "action" ? node.id : null)}
         onPaneClick={() => onSelect?.(null)}
+        {...(onMenu && press)}
+        onKeyDown={(event) => {
+          const asked = onMenu && menuKeyTarget(event);
+          if (!asked) return;
+          event.preventDefault();
+          onMenu(asked.id, asked.screen);
+        }}
         nodesDraggable={false}
         nodesConnectable={false}
         panActivationKeyCode={null} // the space key plays the replay

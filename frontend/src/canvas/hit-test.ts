@@ -1,5 +1,5 @@
 /** Finds what lies at a point on the screen. */
-import type { Position } from "../../graph/model";
+import type { Position } from "../graph/model";
 
 type Pointed = { clientX: number; clientY: number } | { changedTouches: TouchList };
 

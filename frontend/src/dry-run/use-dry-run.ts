@@ -7,7 +7,7 @@ import {
   useMemo,
   useState,
 } from "react";
-import { type TraceEvent, useDryRunResult } from "../api/dry-runs";
+import { type DryRunPart, type TraceEvent, useDryRunResult } from "../api/dry-runs";
 import type { AskedInput, StartValues } from "../api/starts";
 import type { Graph, Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
@@ -66,6 +66,8 @@ export interface DryRun {
   readonly given: GivenValues | null;
   /** The moment of a run from which it starts; null: from its own start. */
   readonly seed: DryRunSeed | null;
+  /** Where it begins, if not at the entry. */
+  readonly part: DryRunPart | null;
   /** Facts of that moment that are unknown, or that the rules do not reach. */
   readonly doubts: readonly SeedDoubt[];
   go(index: number): void;
@@ -177,12 +179,14 @@ function useResult(
   open: boolean,
   seq: number,
   decided: Decisions,
+  part: DryRunPart | null,
   values: StartValues = NO_VALUES,
 ) {
-  const wanted = useMemo(
-    () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided), values } : null),
-    [open, seq, decided, values],
-  );
+  const wanted = useMemo(() => {
+    if (!open) return null;
+    const played = { seq, script: scriptOf(decided), commands: commandsOf(decided), values };
+    return part === null ? played : { ...played, from: part };
+  }, [open, seq, decided, values, part]);
   return useDryRunResult(id, wanted);
 }
 
@@ -192,6 +196,7 @@ const NOT_ASKED: readonly AskedInput[] = [];
 /** With what it begins, what was decided since, and where in it one is. */
 function useDecisions() {
   const [seed, setSeed] = useState<DryRunSeed | null>(null);
+  const [part, setPart] = useState<DryRunPart | null>(null);
   const [beginning, setBeginning] = useState(NOTHING_DECIDED);
   const [decided, setDecided] = useState(NOTHING_DECIDED);
   const [at, setAt] = useState(0);
@@ -203,9 +208,14 @@ function useDecisions() {
     play(false);
   }, []);
   const begin = useCallback(
-    (seeded: DryRunSeed | null = null, script: DryRunSeed["behaviours"] = {}) => {
+    (
+      seeded: DryRunSeed | null = null,
+      script: DryRunSeed["behaviours"] = {},
+      begins: DryRunPart | null = null,
+    ) => {
       const before = seeded === null ? { ...NOTHING_DECIDED, before: script } : decidedBy(seeded);
       setSeed(seeded);
+      setPart(begins);
       setBeginning(before);
       give(null);
       from(before);
@@ -213,17 +223,17 @@ function useDecisions() {
     [from],
   );
   const restart = useCallback(() => from(beginning), [from, beginning]);
-  return { seed, decided, setDecided, at, setAt, playing, play, given, give, begin, restart };
+  return { seed, part, decided, setDecided, at, setAt, playing, play, given, give, begin, restart };
 }
 
 /** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
 export function useDryRun(id: string, graph: Graph, seq: number) {
   const [open, setOpen] = useState(false);
-  const { seed, decided, setDecided, at, setAt, playing, play, given, give, ...beginnings } =
+  const { seed, part, decided, setDecided, at, setAt, playing, play, given, give, ...beginnings } =
     useDecisions();
   const [goal, setGoal] = useState<number | null>(null);
   const [speed, setSpeed] = useState<number>(1);
-  const result = useResult(id, open, seq, decided, given?.values);
+  const result = useResult(id, open, seq, decided, part, given?.values);
   const { data, isPlaceholderData, error: failed } = result;
   const busy = data === undefined || isPlaceholderData;
   const trace = useMemo(() => data?.trace ?? [], [data]);
@@ -269,11 +279,26 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
       open
         ? {
             ...shown,
-            ...{ playing, speed, decided, busy, failed, cut, asked, given, seed, doubts },
+            ...{ playing, speed, decided, busy, failed, cut, asked, given, seed, part, doubts },
             ...commands,
           }
         : null,
-    [open, shown, playing, speed, decided, busy, failed, cut, asked, given, seed, doubts, commands],
+    [
+      open,
+      shown,
+      playing,
+      speed,
+      decided,
+      busy,
+      failed,
+      cut,
+      asked,
+      given,
+      seed,
+      part,
+      doubts,
+      commands,
+    ],
   );
   return { dryRun, begin };
 }

@@ -76,6 +76,8 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   ...DRY_RUN,
   partial.runFrom,
   partial.runOnly,
+  partial.dryRunFrom,
+  partial.dryRunOnly,
   graph.exportUmrf,
   graph.exportSvg,
   graph.exportPng,

@@ -1,6 +1,7 @@
 /** The context of edit actions: the open graph, the selection, and the view. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
+import type { DryRunPart } from "../api/dry-runs";
 import type { EditorStore } from "../canvas/editor-store";
 import { freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
 import { CARD } from "../canvas/geometry/ranks";
@@ -146,7 +147,11 @@ export interface EditorContext {
   /** True if this person may change the present graph; the past cannot be changed. */
   readonly mayGoBack: boolean;
   /** Begins a dry-run. `from` is a recorded moment of a run; `script` says what actions do at first. */
-  beginDryRun(from?: DryRunSeed | null, script?: DryRunSeed["behaviours"]): void;
+  beginDryRun(
+    from?: DryRunSeed | null,
+    script?: DryRunSeed["behaviours"],
+    part?: DryRunPart | null,
+  ): void;
   select(ids: Iterable<string>): void;
   setTool(tool: Tool): void;
   setSnap(snap: boolean): void;

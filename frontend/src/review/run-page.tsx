@@ -17,7 +17,7 @@ import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
 import { serverTimeOf } from "../clock/server-clock";
 import { runMarks } from "../graph/breakpoints";
-import type { Key } from "../graph/model";
+import type { Key, Position } from "../graph/model";
 import { Answers } from "../status/answers";
 import { RunQuestions } from "../status/held-notice";
 import { type TimeRange, turnedTo } from "../status/lanes/axis";
@@ -34,6 +34,7 @@ import { StateLabel } from "../status/state-label";
 import { WaitButton } from "../status/wait-button";
 import { withWaits } from "../status/waits";
 import { Empty } from "../ui/empty";
+import { useStableCallback } from "../ui/hooks";
 import { instant, useNow } from "../ui/times";
 import type { Crumb } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
@@ -43,6 +44,7 @@ import { graphsOn, LevelBar, type LevelCursor, useLevel } from "./levels";
 import { type ReplayCursor, useReplay } from "./replay";
 import { PlayerControls, silentTimesOf, timelineSignsOf } from "./replay-controls";
 import { DryRunFromHere, RunActions } from "./run-actions";
+import { hasRunMenu, RunCanvasMenu, type RunCanvasPlace } from "./run-canvas-menu";
 import { RawEvents, RunEvents } from "./run-events";
 import { PinRun, RunFacts, RunNotes, useVersionLabel } from "./run-facts";
 import type { RepeatActions } from "./run-menu";
@@ -352,6 +354,14 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const picked = useMemo(() => new Set(point === null ? [] : [point]), [point]);
   const store = useRunMarks(newest, level);
   const isLedNow = Boolean(newest.robots) && goes && level.levels.length === 0;
+  const [menu, setMenu] = useState<RunCanvasPlace | null>(null);
+  const isMenuHere = !past && level.levels.length === 0;
+  const openMenu = useStableCallback((id: string, screen: Position) => {
+    if (!isMenuHere || !hasRunMenu(newest, level.graph, id)) return;
+    if (level.graph.actions.some((each) => each.key === id)) select(id);
+    else if (isLedNow) pickArrow(id);
+    setMenu({ id, screen });
+  });
   const replayData = useReplayData(runner, newest.id, 0, true).data;
   const label = useVersionLabel(newest);
   const show = (at: number, fact: string | null) => {
@@ -392,6 +402,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
               selected={picked}
               onSelect={select}
               onSelectArrow={isLedNow ? pickArrow : undefined}
+              onMenu={isMenuHere ? openMenu : undefined}
               label={canvasLabel(newest, level, label)}
             />
           </EditorStoreProvider>
@@ -417,6 +428,14 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           onSelect={level.pick}
         />
       </main>
+      {menu !== null && isMenuHere && (
+        <RunCanvasMenu
+          key={menu.id}
+          {...{ run: newest, graph: level.graph, place: menu, engines }}
+          onStart={setAgain}
+          onClose={() => setMenu(null)}
+        />
+      )}
       {again !== null && start(again, () => setAgain(null))}
     </>
   );

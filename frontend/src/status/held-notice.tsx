@@ -1,7 +1,12 @@
 /** A led run that waits for a person: the reason, what moves all the same, *Step* and *Go on*. */
 import { NativeSelect } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconHandStop, IconPlayerPlayFilled, IconPlayerTrackNext } from "@tabler/icons-react";
+import {
+  IconHandStop,
+  IconPlayerPlayFilled,
+  IconPlayerTrackNext,
+  IconStairsUp,
+} from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText, isOutcomeUnknown } from "../api/http";
@@ -16,7 +21,7 @@ import { HoldButton } from "../ui/hold-button";
 import { boundedPart } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
 import style from "./held-notice.module.css";
-import { actionWords } from "./level-places";
+import { actionWords, INTO, spaced } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
 import { movingRests } from "./rests";
 import { ServiceNotices } from "./robot-rights";
@@ -95,6 +100,15 @@ function failure(error: unknown, run: Run) {
   };
 }
 
+/** Return the opened sub-graphs over which a held run can go: those around all actions that wait to begin. */
+function levelsAround(run: Run): string[][] {
+  const ways = (run.held?.next ?? []).map(({ action }) => run.actions?.[action]?.levels ?? []);
+  const [first = [], ...others] = ways;
+  const shared = first.findIndex((name, at) => others.some((way) => way[at] !== name));
+  const common = shared < 0 ? first : first.slice(0, shared);
+  return common.map((_, at) => common.slice(0, at + 1)).reverse();
+}
+
 /** Return the actions until which a held run can go on: those of its graph that do not wait already. */
 export function laterActions(run: Run): string[] {
   const ready = new Set((run.held?.next ?? []).map(({ action }) => action));
@@ -138,6 +152,21 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
             question={`Let only ${place} begin? ${robot === SIMULATOR ? "Nothing moves." : "A robot may begin to move at once."}`}
             disabled={disabled}
             onHeld={() => press.mutate({ action })}
+          />
+        );
+      })}
+      {levelsAround(run).map((over) => {
+        const level = isolated(over.map(spaced).join(INTO));
+        return (
+          <HoldButton
+            key={level}
+            size="compact-sm"
+            icon={<IconStairsUp size={13} aria-hidden />}
+            label={`Over ${level}`}
+            name={`Let all inside of ${level} begin, then wait again`}
+            question={`Let all inside of ${level} begin? ${moves}`}
+            disabled={disabled}
+            onHeld={() => press.mutate({ over })}
           />
         );
       })}

@@ -109,5 +109,7 @@ export function wayWords({ levels, name }: Pick<LevelPlace, "levels" | "name">):
 
 /** An action of a run in words, with the actions that it is inside of: `Round__Fetch__0/Lift_0` is Fetch 0 › Lift 0. */
 export function actionWords(run: Run, name: string): string {
+  const opened = run.actions?.[name]?.levels;
+  if (opened) return wayWords({ levels: opened, name });
   return wayWords(placesOf(run).get(name) ?? { levels: [], name });
 }

@@ -38,6 +38,7 @@ export function RunPoint({ run, graph, id }: Props) {
   const may = useMay(run.simulated ? "simulate" : "operate");
   const place = graph === null || id === null ? null : placeIn(graph, id);
   if (!may || place === null || graph === null || id === null || !canSteer(run)) return null;
+  if (run.actions?.[place.action] === undefined) return null; // of a sub-graph that is opened
   return <Steering key={id} {...{ run, graph, id, place }} />;
 }
 

@@ -48,6 +48,7 @@ import {
 } from "../../canvas/folding/folding";
 import { positionsOf, unplaced } from "../../canvas/geometry/arrange";
 import type { Positions } from "../../canvas/geometry/ranks";
+import { arrowAt, pointOf } from "../../canvas/hit-test";
 import type { ProblemMarks } from "../../canvas/marks/problem-marks";
 import { notePlaces } from "../../canvas/notes/note-nodes";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
@@ -56,7 +57,6 @@ import type { Graph, Key, Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import type { Participant } from "../../sync/presence/presence";
 import { usePeople, useRoom } from "../../sync/use-room";
-import { arrowAt, pointOf } from "./hit-test";
 
 export interface MeasuredSize {
   readonly width: number;

@@ -5,12 +5,12 @@
 import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
 import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
 import type { Arrow } from "../../canvas/elements";
+import { nodeAt, pointOf } from "../../canvas/hit-test";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { connect, moveRelation, retarget } from "../../graph/edit";
 import type { Key, Position, Precondition } from "../../graph/model";
 import { ENTRY } from "../../graph/model";
 import { keyOf } from "../../ui/keys";
-import { nodeAt, pointOf } from "./hit-test";
 
 export interface Pending {
   readonly key: Key;

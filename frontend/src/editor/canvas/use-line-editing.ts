@@ -4,13 +4,13 @@ import { useMemo } from "react";
 import { pillWord } from "../../canvas/arrows/bundles";
 import type { LineEditing } from "../../canvas/arrows/line-store";
 import type { PlaceMap } from "../../canvas/editor-store";
+import { nodeAt } from "../../canvas/hit-test";
 import { type EditorContext, nudging } from "../../edit-actions/editor-context";
 import { moveRelation, retarget } from "../../graph/edit";
 import { setWaypoints } from "../../graph/edit/waypoints";
 import type { Key, Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { useStableCallback } from "../../ui/hooks";
-import { nodeAt } from "./hit-test";
 
 /**
  * Leads an arrow from or to another action, and says so if that is impossible. `outcome`: moves

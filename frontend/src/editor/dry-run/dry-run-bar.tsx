@@ -22,6 +22,7 @@ import * as editActions from "../../edit-actions/dry-run-actions";
 import { type EditAction, labelOf } from "../../edit-actions/edit-action";
 import { type EditorContext, selectedActions } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
+import { spokenName } from "../../graph/field-words";
 import { fullName } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { stopwatch } from "../../ui/times";
@@ -37,6 +38,19 @@ function Doubt({ doubt: { node, text } }: { doubt: SeedDoubt }) {
     <li>
       {node !== "" && <b>{node}</b>} {text}.
     </li>
+  );
+}
+
+/** Says which part of the graph is played. */
+function PartNote({ run: { part } }: { run: DryRun }) {
+  if (part === null) return null;
+  const names = part.at.slice(0, 3).map((each) => isolated(spokenName(each)));
+  const more = part.at.length > 3 ? ` and ${part.at.length - 3} more` : "";
+  return (
+    <span className="nowrap ink2 text-xs">
+      {part.only ? "only" : "from"} {names.join(", ")}
+      {more}; what is skipped counts as ended
+    </span>
   );
 }
 
@@ -286,6 +300,7 @@ export function DryRunBar({
       <div className={style.row}>
         <span className={style.title}>Dry-run</span>
         <SeedNote run={run} />
+        <PartNote run={run} />
         <DryRunValues key={run.seed?.run} graph={context.id} run={run} />
         <Step context={context} editAction={editActions.restart}>
           <IconPlayerSkipBack size={17} aria-hidden />
@@ -348,7 +363,7 @@ export function DryRunBar({
       </div>
       <div className={style.note}>
         <span>Nothing of this is recorded.</span>
-        <KeepDryRun run={run} />
+        {run.part === null && <KeepDryRun run={run} />}
         {record}
       </div>
     </section>

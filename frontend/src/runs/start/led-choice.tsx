@@ -149,6 +149,37 @@ export function WayChoice({ led, several, onLed }: WayProps) {
   );
 }
 
+interface LevelsChoiceProps {
+  opened: boolean;
+  onOpened: (opened: boolean) => void;
+}
+
+/** The choice between sub-graphs that are one step each, and the actions inside as steps. */
+export function LevelsChoice({ opened, onOpened }: LevelsChoiceProps) {
+  const ways = [
+    [false, "One step each: a robot gets the whole sub-graph at once"],
+    [true, "Opened: each action inside is a step of its own"],
+  ] as const;
+  return (
+    <fieldset className={style.part}>
+      <legend>Sub-graphs</legend>
+      <div className={style.lost}>
+        {ways.map(([value, words]) => (
+          <label key={words} className="finger">
+            <input
+              type="radio"
+              name="levels"
+              checked={opened === value}
+              onChange={() => onOpened(value)}
+            />
+            {words}
+          </label>
+        ))}
+      </div>
+    </fieldset>
+  );
+}
+
 interface LedChoiceProps {
   /** Empty where the robots cannot be chosen. */
   actors: readonly string[];

@@ -37,6 +37,7 @@ import {
   castObstacle,
   castOf,
   LedChoice,
+  LevelsChoice,
   movesWords,
   PeopleChoice,
   WayChoice,
@@ -322,10 +323,13 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const led = continues || asks || (wanted ?? (several || waits));
   const offered = !continues && !asks && (several || waits || led || mayLead);
   const cast = castOf(actors, picked, now.engines, may);
+  const [opens, setOpens] = useState(before?.levels === "opened");
+  const mayOpen = led && beginning === undefined && (graphs?.length ?? 0) > 0;
   const needsNone = actors.length === 0 && asks && graphs !== null;
   const missing = led && !needsNone ? castObstacle(actors, cast) : null;
   const way = { text, marks, actors, several, led, want, offered };
-  return { ...way, cast, pick, lost, setLost, missing, roles, people, setAnswering };
+  const levels = { mayOpen, opened: mayOpen && opens, setOpens };
+  return { ...way, ...levels, cast, pick, lost, setLost, missing, roles, people, setAnswering };
 }
 
 export function StartDialog(props: Props) {
@@ -337,7 +341,11 @@ export function StartDialog(props: Props) {
   const way = useWay(props);
   const { led, cast } = way;
   const order: LedOrder | null = led
-    ? { robots: cast, lost: way.lost, ...(way.roles.length > 0 && { people: way.people }) }
+    ? {
+        ...{ robots: cast, lost: way.lost },
+        ...(way.roles.length > 0 && { people: way.people }),
+        ...(way.opened && { levels: "opened" as const }),
+      }
     : null;
   const players = [...new Set(Object.values(cast))].sort();
   const engines = led ? players : whole;
@@ -477,6 +485,15 @@ export function StartDialog(props: Props) {
         />
       ) : (
         <Where engines={engines} behaviours={behaviours} onToggle={choose} />
+      )}
+      {way.mayOpen && (
+        <LevelsChoice
+          opened={way.opened}
+          onOpened={(opened) => {
+            setReason("");
+            way.setOpens(opened);
+          }}
+        />
       )}
       {way.roles.length > 0 && (
         <PeopleChoice roles={way.roles} people={way.people} onPeople={way.setAnswering} />
