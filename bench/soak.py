@@ -209,6 +209,15 @@ PARTS: Final[dict[str, Part]] = {
             "tests/runner/execution/test_led_simulated_faults.py",
         ),
     ),
+    "continued": Part(
+        "200 histories of runs that are continued, begun in the middle, queued, killed and stopped, and "
+        "240 of runs that ask people",
+        {"TEST_EXAMPLES": "20"},
+        (
+            *("-s", "tests/runner/execution/test_continued_histories.py"),
+            "tests/runner/execution/test_question_histories.py",
+        ),
+    ),
     "sync": Part(
         "1,000 schedules of a folder that is edited while it is kept in step with a server, with and "
         "without hard links; and rounds of it that end at each of their steps",

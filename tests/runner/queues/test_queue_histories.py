@@ -10,7 +10,7 @@ import random
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 import anyio
 import pytest
@@ -22,8 +22,6 @@ from action_assistant.errors import Refused
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.question_commands import AnswerRequest
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Order, unwatched
-from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.queues.entry import (
     MoveRequest,
     QueueRequest,
@@ -36,11 +34,10 @@ from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.history import whole_of
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, StepRequest, WaitRequest
-from action_assistant.umrf.facts import SIMULATED
-from action_assistant.umrf.semantics import Engine, script_from
+from runner.counted_robots import Begins, CountedRobot
 from runner.execution.test_conductor import led, shared
 from runner.execution.test_questions import CONFIRM, asked_of, line
-from runner.harness import Robot, clock_us, order, run_in_virtual_time, sequence
+from runner.harness import order, run_in_virtual_time, sequence
 from runner.queues.test_queues import QUICK, Lab, on, reopened
 from runner.start.test_rights_registry import ANN, BEN, OLGA, author
 from support.doses import examples
@@ -58,43 +55,6 @@ STEPS: Final = (
 TOTALS: Final = Counter[str]()
 
 
-class CountingEngine(Engine):
-    """Counts how often each of its actions begins, in each run."""
-
-    def __init__(self, begun: Counter[tuple[str, str]], runs: dict[str, str]) -> None:
-        super().__init__(facts=SIMULATED, script=script_from({"behaviours": QUICK}))
-        self.begun = begun
-        self.runs = runs
-
-    def _begin(self, graph: Any, node: Any) -> None:
-        self.begun[self.runs[graph.name], node.full_name] += 1
-        super()._begin(graph, node)
-
-
-class WatchedRobot(Robot):
-    """A robot of which a history sees each message that leaves for it."""
-
-    def __init__(self, history: "History", name: str) -> None:
-        self.history, self.name = history, name
-        self.runs: dict[str, str] = {}  # of its graphs
-        super().__init__(self.new_engine(), random.Random(name))
-
-    def new_engine(self) -> SimulatorLink:
-        """Return an engine that counts what its actions do."""
-        counting = CountingEngine(self.history.begun, self.runs)
-        return SimulatorLink(counting, clock_us=clock_us)
-
-    async def start(self, order: Order, leaves: Any = unwatched) -> None:
-        """One message, whose leaving the history sees."""
-
-        def leaving() -> None:
-            leaves()
-            self.runs[order.graph.name] = order.run
-            self.history.leaves(self.name, order.run)
-
-        await super().start(order, leaving)
-
-
 class History:
     """A random history of queues, and what must hold all the while.
 
@@ -104,7 +64,7 @@ class History:
 
     def __init__(self, seed: int) -> None:
         self.chance = random.Random(seed)
-        self.begun = Counter[tuple[str, str]]()
+        self.begins = Begins()
         self.stops, self.presses = Counter[str](), dict[str, int]()
         self.robots_of: dict[str, tuple[str, ...]] = {}
         self.runs: dict[str, tuple[str, str, tuple[str, ...]]] = {}  # of this process
@@ -114,7 +74,7 @@ class History:
         self.closed: set[int] = set()
         self.control: ExecutionService | None = None
         self.lab = Lab(QUICK)
-        self.robots = {name: WatchedRobot(self, name) for name in ROBOTS}
+        self.robots = {name: CountedRobot(name, self.begins, QUICK, self.leaves) for name in ROBOTS}
         self.lab.harness.links |= self.robots
 
     def leaves(self, robot: str, run: str) -> None:
@@ -337,10 +297,13 @@ class History:
             assert len(sent) == len(set(sent)), (self.log, sent)
         requests = Counter(each.request_id for each in self.lab.starts() if each.piece is None)
         assert all(number == 1 for number in requests.values()), (self.log, requests)
-        assert all(number == 1 for number in self.begun.values()), (self.log, self.begun)
+        assert all(number == 1 for number in self.begins.counts.values()), (
+            self.log,
+            self.begins.times,
+        )
         messages = {each.run for robot in self.robots.values() for each in robot.starts}
-        assert {run for run, _ in self.begun} <= messages, (self.log, self.begun)
-        TOTALS["actions"] += sum(self.begun.values())
+        assert {run for run, _ in self.begins.times} <= messages, (self.log, self.begins.times)
+        TOTALS["actions"] += sum(self.begins.counts.values())
         TOTALS["histories"] += 1
 
 
