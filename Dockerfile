@@ -27,6 +27,10 @@ RUN scripts/image help-tools /opt/help
 COPY README.md CONTRIBUTING.md CHANGELOG.md LICENSE ./
 COPY frontend/public ./frontend/public
 COPY frontend/src/api/schema ./frontend/src/api/schema
+# Tables of codes are made from these; the rest of the program is not needed, and changes more often.
+COPY server/action_assistant/__init__.py server/action_assistant/safe_text.py ./server/action_assistant/
+COPY server/action_assistant/system/__init__.py server/action_assistant/system/diagnostics.py ./server/action_assistant/system/
+COPY server/action_assistant/umrf/__init__.py server/action_assistant/umrf/codes.py server/action_assistant/umrf/model.py ./server/action_assistant/umrf/
 COPY docs ./docs
 RUN scripts/image help /opt/help /out
 

@@ -1,7 +1,11 @@
 """The container files keep their promises, as far as that shows without a container engine;
 `make containers` runs them."""
 
+import json
 import re
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -127,6 +131,52 @@ def test_a_changed_line_of_python_builds_nothing_but_the_package(target: str) ->
     assert stages()[target][-1][0] == "LABEL"
     last = [words for words in stages()[target] if words[0] in {"COPY", "RUN"}][-1]
     assert last[1] == f"--from={target}-package"
+
+
+#: Stands in for the Python of the help's stage: it imports what builds the help, and says what that took.
+_IMPORTS = """
+import json, sys
+from importlib.metadata import packages_distributions
+sys.path.insert(0, "docs/site")
+known = set(sys.modules)
+import build
+tops = {name.partition(".")[0] for name in set(sys.modules) - known}
+files = [each.__file__ for name, each in sys.modules.items() if name.startswith("action_assistant")]
+packages = packages_distributions()
+print(json.dumps([files, sorted({each for top in tops for each in packages.get(top, ())})]))
+"""
+
+
+def test_the_help_needs_nothing_that_its_stage_does_not_have(tmp_path: Path) -> None:
+    """It is made of some files of the program and of the packages in requirements/site.txt."""
+    pytest.importorskip("sphinx")
+    for words in stages()["help"]:
+        for source in words[1:-1] if words[0] == "COPY" else ():
+            target = tmp_path / words[-1]
+            if (ROOT / source).is_dir():
+                shutil.copytree(ROOT / source, target)
+            else:
+                target.mkdir(parents=True, exist_ok=True)
+                shutil.copy(ROOT / source, target)
+    python = tmp_path / "prefix" / "bin" / "python"
+    python.parent.mkdir(parents=True)
+    (tmp_path / "imports.py").write_text(_IMPORTS)
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" imports.py\n')
+    python.chmod(0o755)
+    told = subprocess.run(
+        [tmp_path / "scripts" / "image", "help", tmp_path / "prefix", tmp_path / "out"],
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+    )
+    assert told.returncode == 0, told.stderr.decode()
+    files, packages = json.loads(told.stdout)
+    assert all(Path(each).is_relative_to(tmp_path) for each in files), files
+    locked = set(
+        re.findall(r"^([\w.-]+)==", (ROOT / "requirements/site.txt").read_text(), re.MULTILINE)
+    )
+    ours = "temoto-action-assistant"
+    assert {each.lower().replace("_", "-") for each in packages} - {ours} <= locked
 
 
 def test_copied_files_exist_and_no_others_are_sent_to_the_build() -> None:
