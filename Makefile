@@ -241,7 +241,7 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(LOCK) requirements/site.in --output-file requirements/site.txt
 
 .venv/.done: requirements/dev.txt pyproject.toml scripts/need scripts/packages
-	@scripts/need $(PYTHON)=python3 || exit 1
+	@scripts/need "$(PYTHON)=python3 python3-venv" || exit 1
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or newer is needed; this is $$($(PYTHON) --version)." >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || scripts/need no-such-command=python3-venv
