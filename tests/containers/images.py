@@ -43,6 +43,8 @@ EDITOR: Final = f"temoto-action-assistant/editor:{VERSION}"
 RUNNER: Final = f"temoto-action-assistant/runner:{VERSION}"
 #: The commit from which the images say that they are built.
 COMMIT: Final = run("git", "rev-parse", "HEAD").stdout.strip()
+#: The first commit whose images have a tag of their own; its tables are older than those of today.
+EARLIER: Final = "bbf37f33b"
 _CERTIFICATES: Final = Path("/etc/ssl/certs/ca-certificates.crt")
 _FOLDER_IN: Final = re.compile(r"(?:file://)?(/[^\s'\"]+)")
 
@@ -127,6 +129,25 @@ def compose_build(
     return time.monotonic() - begun
 
 
+def compose_build_earlier(*services: str) -> float:
+    """Build the images of the commit `EARLIER`, and return how many seconds it took."""
+    folder = FOLDER / "earlier"
+    if not folder.exists():
+        run("git", "clone", "--quiet", ROOT, folder)
+        run("git", "checkout", "--quiet", EARLIER, cwd=folder)
+    told = run(sys.executable, "scripts/build_version.py", "env", cwd=folder).stdout
+    lines = dict(line.split("=", 1) for line in told.splitlines())
+    commit = lines["SOURCE_COMMIT"]
+    return compose_build(*services, folder=folder, version=lines["IMAGE_VERSION"], commit=commit)
+
+
+def earlier_version() -> str:
+    """Return the tag of the images that `compose_build_earlier` made last."""
+    lines = podman("images", "--format", "{{.Tag}}", "temoto-action-assistant/editor").split()
+    (found,) = [each for each in lines if each.endswith(EARLIER[:8])]
+    return found
+
+
 def size(name: str) -> int:
     """Return the size of an image in MB."""
     return round(int(inspect(name)["Size"]) / 1e6)
@@ -141,6 +162,7 @@ def make() -> None:
         seconds = compose_build(service)
         name = {"editor": EDITOR, "runner": RUNNER}[service]
         say(f"{name}: {seconds:.0f} s, {size(name)} MB, {size(name) - size(base)} over its base")
+    say(f"both images of {EARLIER}: {compose_build_earlier('editor', 'runner'):.0f} s")
 
 
 if __name__ == "__main__":

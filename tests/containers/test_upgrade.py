@@ -1,39 +1,24 @@
 """Images of an earlier commit, those of this one, and back, by the commands of docs/containers.md."""
 
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
 
-from containers.engine import FOLDER, ROOT, inspect, run
-from containers.images import VERSION, compose_build, say
+from containers.engine import inspect, run
+from containers.images import VERSION, earlier_version
 from containers.stack import Stack, running
 
-#: The first commit whose images have a tag of their own; its tables are older.
-EARLIER = "bbf37f33b"
 PAGE = "http://127.0.0.1:8000"
 SERVICES = ("editor", "runner")
 
 
 @pytest.fixture(scope="module")
 def earlier() -> str:
-    """Build the images of the earlier commit, and return their tag."""
-    folder = FOLDER / "earlier"
-    if not folder.exists():
-        run("git", "clone", "--quiet", ROOT, folder)
-        run("git", "checkout", "--quiet", EARLIER, cwd=folder)
-    said = run(sys.executable, "scripts/build_version.py", "env", cwd=folder).stdout
-    told = dict(line.split("=", 1) for line in said.splitlines())
-    version = told["IMAGE_VERSION"]
-    for service in SERVICES:
-        seconds = compose_build(
-            service, folder=folder, version=version, commit=told["SOURCE_COMMIT"]
-        )
-        say(f"{service}:{version}: {seconds:.0f} s")
-    return version
+    """The tag of the images of the earlier commit."""
+    return earlier_version()
 
 
 @pytest.fixture
