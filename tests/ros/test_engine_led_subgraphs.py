@@ -24,12 +24,14 @@ pytest.importorskip(
 )
 
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
-from action_assistant.runner.start.admission import StartRequest
+from action_assistant.runner.runs.views import time as time_of
+from action_assistant.runner.start.admission import GoOnRequest, StartRequest, StepRequest
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph
 from ros.led_engines import Engines, as_led, ends_of, over, relay
-from runner.harness import ANN, BEN
+from runner.harness import ANN, BEN, until
 from support.real_engine import needs_engine
 
 OUTCOMES = int(os.environ.get("TEST_LED_OUTCOMES", "12"))
@@ -107,6 +109,41 @@ def test_each_outcome_of_a_sub_graph_is_that_of_the_code(engines: Engines) -> No
     anyio.run(main)
     sys.stdout.write(f"\n{dict(count)}, wrong: {len(wrong)}\n")
     assert wrong == []
+
+
+def test_a_step_goes_into_an_opened_sub_graph_and_over_it_on_two_engines(engines: Engines) -> None:
+    async def main() -> None:
+        def begun() -> int:
+            return sum(line.what == "begin" for line in engines.lines())
+
+        async with engines.led() as (control, _):
+            start = msgspec.structs.replace(
+                task("opened", LONG, SUBS["on_true"]),
+                levels="opened",
+                lost="wait",
+                breakpoints=(Breakpoint(action="SubLong2_0"),),
+            )
+            run = (await control.start(start, ANN)).run.id
+
+            async def held(begins: int) -> StepRequest:
+                await until(lambda: begun() == begins, 30)
+                await until(lambda: control.open[run].run.held is not None, 30)
+                await until(lambda: bool(control.open[run].run.waits), 30)
+                await anyio.sleep(1)
+                found = control.open[run].run.held
+                assert found is not None
+                assert begun() == begins
+                return StepRequest(time_of(found.at))
+
+            await control.step(run, await held(0), ANN)
+            over_it = msgspec.structs.replace(await held(1), over=("SubLong2_0",))
+            await control.step(run, over_it, ANN)
+            last = await held(2)
+            await control.go_on(run, GoOnRequest(last.since), ANN)
+            assert await over(control, run, 30) == "finished"
+            assert begun() == 4
+
+    anyio.run(main)
 
 
 def test_no_code_inside_runs_after_a_stop_was_proven(engines: Engines) -> None:

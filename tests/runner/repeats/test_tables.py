@@ -29,9 +29,15 @@ COLUMNS = (
 def test_in_csv_what_is_not_known_is_empty_and_no_text_is_a_formula() -> None:
     first, second = csv.DictReader(io.StringIO(csv_of(COLUMNS).decode()))
     assert first == {
-        **{"cell": "1", "state": "finished", "started_at": "2026-11-30T12:00:00.250000+00:00"},
-        **{"seconds_most": "1.250", "Work_1.place": "'=cmd|' /C calc'!A0", "Work_1.torque": "6.5"},
-        **{"Work_1.fast": "true", "Work_1.points": "[1.0,2.5]", "Work_1.odd": "a"},
+        "cell": "1",
+        "state": "finished",
+        "started_at": "2026-11-30T12:00:00.250000+00:00",
+        "seconds_most": "1.250",
+        "Work_1.place": "'=cmd|' /C calc'!A0",
+        "Work_1.torque": "6.5",
+        "Work_1.fast": "true",
+        "Work_1.points": "[1.0,2.5]",
+        "Work_1.odd": "a",
     }
     unknown = {name for name, word in second.items() if word == ""}
     assert unknown == {*first} - {"cell", "Work_1.odd"}
@@ -66,9 +72,15 @@ def test_parquet_has_the_columns_of_the_csv_with_their_types() -> None:
 
     found: Any = parquet.read_table(io.BytesIO(parquet_of(COLUMNS)))
     assert {each.name: str(each.type) for each in found.schema} == {
-        **{"cell": "int64", "state": "string", "started_at": "timestamp[us, tz=UTC]"},
-        **{"seconds_most": "double", "Work_1.place": "string", "Work_1.torque": "double"},
-        **{"Work_1.fast": "bool", "Work_1.points": "list<element: double>", "Work_1.odd": "string"},
+        "cell": "int64",
+        "state": "string",
+        "started_at": "timestamp[us, tz=UTC]",
+        "seconds_most": "double",
+        "Work_1.place": "string",
+        "Work_1.torque": "double",
+        "Work_1.fast": "bool",
+        "Work_1.points": "list<element: double>",
+        "Work_1.odd": "string",
     }
     rows = found.to_pylist()
     known = {each.name: [each.values[0], each.values[1]] for each in COLUMNS}
