@@ -114,7 +114,7 @@ test("who starts is told who waits, and waits too, once, although the answer get
   await picture(page, "others-360");
   expect(await isTooWide(page)).toBe(false);
   await wait.getByRole("button", { name: "Wait in the queue" }).click();
-  await expect(notice(page)).toContainText("Put into the queue after all: v2 of chain_1.");
+  await expect(notice(page)).toContainText("v2 of chain_1 was put into the queue after all.");
   await expect(page.getByRole("dialog")).toBeHidden();
   await picture(page, "lost-360");
   await page.unrouteAll();

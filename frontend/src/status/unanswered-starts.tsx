@@ -23,7 +23,7 @@ const PATIENCE = 5_000; // ms that one look waits
 
 /** The engines of a start that the runner has no run for; none once it is known to be in the queue. */
 export function missing(sent: SentStart, found: StartFound | undefined): readonly string[] {
-  if (sent.queues) return found?.queued ? [] : sent.engines;
+  if (found?.queued) return [];
   const there = new Set((found?.runs ?? []).map((run) => run.engine));
   return sent.engines.filter((engine) => !there.has(engine));
 }
@@ -36,41 +36,15 @@ export function unknownWords(
 ): string | null {
   const left = missing(sent, found);
   if (left.length === 0) return null;
-  if (sent.queues) return queueWords(sent.what, found, silent);
   const where = left.map((engine) =>
     engine === SIMULATOR ? "the simulator" : engine === CONDUCTED ? "its robots" : engine,
   );
-  const head = `NOT KNOWN whether ${sent.what} started on ${where.map(isolated).join(", ")}.`;
-  const after = "The page looks for this start, and does not send it again. Stop works.";
+  const does = sent.does ?? `started on ${where.map(isolated).join(", ")}`;
+  const head = `NOT KNOWN whether ${sent.what} ${does}.`;
+  const after = `The page looks for this start, and does not send it again. ${sent.hint ?? "Stop works."}`;
   if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
   if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;
   return `${head} The runner knows nothing of this start so far. ${after}`;
-}
-
-function queueWords(what: string, found: StartFound | undefined, silent: boolean): string {
-  const head = `NOT KNOWN whether ${what} was put into the queue.`;
-  const after = "Nothing starts by that. Another press of the same counts once.";
-  if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
-  if (found.under_way) return `${head} The runner is just looking at it. ${after}`;
-  return `${head} The runner knows nothing of it so far. ${after}`;
-}
-
-/** Says what a start has become that was put into the queue. */
-function Queued({ sent, found }: { sent: SentStart; found: StartFound }) {
-  if (!found.queued || found.runs.length > 0) return null;
-  return (
-    <p className={style.found}>
-      <span>
-        {found.queued.waits ? (
-          <>
-            Put into <Link to="/runs/queue">the queue</Link> after all: {sent.what}.
-          </>
-        ) : (
-          `${sent.what} was put into the queue, and has been removed from it.`
-        )}
-      </span>
-    </p>
-  );
 }
 
 function Found({ run }: { run: Run }) {
@@ -107,7 +81,13 @@ function Start({ sent }: { sent: SentStart }) {
     <div className={style.start} data-unknown={unknown !== null || undefined}>
       <div>
         {unknown !== null && <p role="alert">{unknown}</p>}
-        {sent.queues && found && <Queued sent={sent} found={found} />}
+        {found?.queued && runs.length === 0 && (
+          <p className={style.found}>
+            <span>
+              {sent.what} was put into <Link to="/runs/queue">the queue</Link> after all.
+            </span>
+          </p>
+        )}
         {runs.map((run) => (
           <Found key={run.id} run={run} />
         ))}
@@ -144,8 +124,9 @@ export interface SentStart {
   /** The graph that was sent, in words: "v3 of patrol". */
   what: string;
   engines: readonly string[];
-  /** Set if it was sent to wait in the queue. */
-  queues?: true;
+  /** What it does if it arrives, and what to know until that is seen, if it is sent to wait and not to start. */
+  does?: string;
+  hint?: string;
   /** Time at which it was sent, ms. */
   at: number;
 }

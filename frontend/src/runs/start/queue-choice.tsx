@@ -11,8 +11,9 @@ import type { Preflight } from "../../api/robots";
 import { sendPress } from "../../api/runs";
 import { sendNoted, Unanswered } from "../../status/unanswered-starts";
 import { isolated } from "../../words/isolated";
+import { pressOf } from "./looked-at";
 import style from "./start-dialog.module.css";
-import { notifyFailure, pressOf, type StartInput, useOrder, versionWords } from "./use-start";
+import { notifyFailure, type StartInput, useOrder, versionWords } from "./use-start";
 
 /** Items in the way that waiting, or the person at the start itself, may mend. */
 const PASSING: ReadonlySet<string> = new Set([
@@ -68,7 +69,9 @@ function useEnterQueue(graph: string, onSent: () => void) {
       const { version, order } = await ordered({ ...rest, digest: wanted.digest ?? "" });
       const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
       const what = versionWords(versions, version);
-      const sent = { graph, what, engines: order.engines, queues: true as const };
+      const does = "was put into the queue";
+      const hint = "Nothing starts by that. Another press of the same counts once.";
+      const sent = { graph, what, engines: order.engines, does, hint };
       return sendPress(pressOf("queue", order), (request) =>
         sendNoted({ ...sent, request }, () => enterQueue({ ...order, request })),
       );

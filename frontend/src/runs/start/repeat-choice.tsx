@@ -11,8 +11,9 @@ import { inputWords, placeOfInput } from "../../status/value-words";
 import { useKeptText } from "../../ui/kept-texts";
 import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
+import { notifyPressFailure, sendLookedAt } from "./looked-at";
 import style from "./start-dialog.module.css";
-import { notifyPressFailure, type StartInput, sendLookedAt, useOrder } from "./use-start";
+import { type StartInput, useOrder } from "./use-start";
 
 const MOST = 500; // runs of one repeat
 

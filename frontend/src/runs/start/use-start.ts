@@ -4,11 +4,11 @@ import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { Script } from "../../api/dry-runs";
 import { publish, queryKeys, type Version, versionName } from "../../api/graphs";
-import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
+import { errorPlace, errorText } from "../../api/http";
 import { insideOf } from "../../api/inside";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
-import { type Started, type StartOrder, sendPress, startRun, type Watching } from "../../api/runs";
+import { type Started, type StartOrder, startRun, type Watching } from "../../api/runs";
 import type { StartFrom, StartValues } from "../../api/starts";
 import type { RunBreakpoint } from "../../graph/breakpoints";
 import { newAid } from "../../graph/document-keys";
@@ -62,38 +62,6 @@ export function nextLabel(versions: readonly Version[], seq: number): string {
 
 export function notifyFailure(title: string, message: string): void {
   notifications.show({ color: "red", title, message, autoClose: 15_000 });
-}
-
-/** An error of a request whose outcome nobody knows: the message stays until a person closes it. */
-class NotKnown extends Error {}
-
-/** Return a name of a press of what was looked at: the same for the same. */
-export function pressOf(what: string, { umrf: _, ...named }: LookedAtOrder): string {
-  return `${what} ${JSON.stringify(named)}`;
-}
-
-/**
- * Send a press of what was looked at. If its answer gets lost, the next press of the same is sent with the same
- * request id, so that the two count once, and the error says that nobody knows.
- */
-export function sendLookedAt<T>(
-  what: string,
-  order: LookedAtOrder,
-  send: (order: StartOrder) => Promise<T>,
-): Promise<T> {
-  const press = sendPress(pressOf(what, order), (request) => send({ ...order, request }));
-  return press.catch((error: unknown) => {
-    throw isOutcomeUnknown(error) ? new NotKnown(errorText(error)) : error;
-  });
-}
-
-/** Tell that a press came to nothing, or that nobody knows. `title`: for the first; `unknown`: what is not known. */
-export function notifyPressFailure(error: unknown, title: string, unknown: string): void {
-  if (error instanceof NotKnown) {
-    const message = `${error.message} Another press of the same counts once.`;
-    const head = `NOT KNOWN whether ${unknown}`;
-    notifications.show({ color: "red", autoClose: false, title: head, message });
-  } else notifyFailure(title, errorText(error));
 }
 
 /**

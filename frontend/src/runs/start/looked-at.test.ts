@@ -1,7 +1,8 @@
 import { expect, test } from "vitest";
 import { Refusal } from "../../api/http";
 import type { StartOrder } from "../../api/runs";
-import { type LookedAtOrder, sendLookedAt } from "./use-start";
+import { sendLookedAt } from "./looked-at";
+import type { LookedAtOrder } from "./use-start";
 
 const order: LookedAtOrder = {
   ...{ runner: "http://runner", version: "v", digest: "d", umrf: "{}", graph: "g" },
