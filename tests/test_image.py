@@ -133,6 +133,31 @@ def test_a_changed_line_of_python_builds_nothing_but_the_package(target: str) ->
     assert last[1] == f"--from={target}-package"
 
 
+@pytest.mark.parametrize(
+    ("words", "called"),
+    [
+        ("doctor --json", "doctor --only machine --json"),
+        ("doctor", "doctor --only machine"),
+        ("doctor --before-upgrade", "doctor --before-upgrade"),
+        ("people list", "people list"),
+    ],
+)
+def test_doctor_looks_for_robots_where_the_image_has_ros(
+    tmp_path: Path, words: str, called: str
+) -> None:
+    script = (ROOT / "scripts" / "image").read_text()
+    script = script.replace("/opt/action-assistant/bin/action-assistant", "echo")
+    for folder, said in ((tmp_path / "none", called), (tmp_path, words)):
+        (tmp_path / "image").write_text(script.replace("/opt/ros", str(folder)))
+        told = subprocess.run(
+            ["sh", tmp_path / "image", "run", *words.split()],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert told.stdout == f"{said}\n"
+
+
 #: Stands in for the Python of the help's stage: it imports what builds the help, and says what that took.
 _IMPORTS = """
 import json, sys
