@@ -111,3 +111,31 @@ def test_a_secret_that_is_named_and_not_there_is_not_done_without(
         file.write_bytes(content)
     with pytest.raises(CannotStart, match="ACTION_ASSISTANT_TOKEN_FILE is "):
         settings.take_secrets_from_files({"ACTION_ASSISTANT_TOKEN_FILE": str(file)})
+
+
+def test_links_from_runs_have_a_name_a_web_address_and_known_places() -> None:
+    name = "ACTION_ASSISTANT_RUN_LINKS"
+    good = (
+        "Video=https://nvr.lab/{robot}?from={from}&to={to_ms}; Bags = http://10.0.0.2:8080/{run} ;"
+    )
+    assert settings.run_links({}) == ()
+    assert settings.run_links({name: good}) == (
+        settings.RunLink("Video", "https://nvr.lab/{robot}?from={from}&to={to_ms}"),
+        settings.RunLink("Bags", "http://10.0.0.2:8080/{run}"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("https://nvr.lab/", "NAME=URL"),
+        ("Video=javascript:alert(1)", "http:// or https://"),
+        ("Video=https://{robot}.lab/", "a host"),
+        ("Video=https://nvr.lab/a b", "NAME=URL"),
+        ("Video=https://nvr.lab/{password}", "{password} is none of {at}"),
+    ],
+)
+def test_another_link_from_runs_stops_the_start_with_its_reason(written: str, why: str) -> None:
+    with pytest.raises(CannotStart) as refused:
+        settings.run_links({"ACTION_ASSISTANT_RUN_LINKS": written})
+    assert why in str(refused.value)

@@ -23,7 +23,10 @@ interface Version {
   umrf: string;
 }
 
-const product = new Product();
+const VIDEO = "https://nvr.lab.example";
+const product = new Product([], "", {
+  ACTION_ASSISTANT_RUN_LINKS: `Video=${VIDEO}/{robot}?from={from}&at={at_ms}`,
+});
 const david = new StandIn("David");
 const eve = new StandIn("Eve");
 const stranger = new Stranger();
@@ -225,6 +228,17 @@ test("a failure: its cause, its lane, and the replay that does not know it yet",
   await expect(card(page, "Jam").getByText("error")).toBeHidden();
   await page.keyboard.press("End");
   await expect(card(page, "Jam").getByText("error")).toBeVisible();
+});
+
+test("what a camera saw is one link away, at the moment that is shown", async () => {
+  const { page } = ada;
+  await open(page, runs.bad);
+  await page.getByRole("tab", { name: "Facts" }).click();
+  const link = page.getByRole("link", { name: "Video" });
+  await expect(link).toHaveAttribute("href", new RegExp(`^${VIDEO}/David\\?from=20`));
+  const end = await link.getAttribute("href");
+  await page.getByRole("button", { name: "To the start" }).click();
+  await expect(link).not.toHaveAttribute("href", end ?? "");
 });
 
 test("the good and the bad one part where it jammed, and the graph had changed there", async () => {

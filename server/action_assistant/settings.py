@@ -53,6 +53,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "`owner=12h/7d,operator=3d/30d` (owner=7d/30d, operator=14d/30d, others 30d/30d)",
     "ACTION_ASSISTANT_FRAME_ORIGINS": "sites that may show links to one graph or run in a frame, such as "
     "`https://wiki.lab.example`, comma separated (none)",
+    "ACTION_ASSISTANT_RUN_LINKS": "where other programs keep what they recorded of a run, such as "
+    "`Video=https://nvr.lab.example/{robot}?from={from}&to={to}`, separated by `;` (none)",
     "ACTION_ASSISTANT_OIDC_ISSUER": "the OpenID Connect provider by which people may sign in, such as "
     "https://login.example.org/realms/lab",
     "ACTION_ASSISTANT_OIDC_CLIENT_ID": "the name of this program at that provider",
@@ -82,6 +84,11 @@ _FILES: Final[Mapping[str, str]] = {
 }
 #: An origin as `frame-ancestors` takes it; the first part of its host may be an asterisk.
 _ORIGIN: Final = re.compile(r"https?://((\*\.)?[A-Za-z0-9.-]+|\[[0-9a-fA-F:]+\])(:\d{1,5})?")
+#: Places in the address of a link from a run; the page fills them in.
+_PLACES: Final = frozenset({"robot", "run", "from", "to", "at", "from_ms", "to_ms", "at_ms"})
+_PLACE: Final = re.compile(r"\{([^{}]*)\}")
+#: The start of an address that a browser opens; what follows the host may hold places.
+_WEB: Final = re.compile(r"https?://[A-Za-z0-9.\[\]:-]+([/?#]\S*)?")
 _OIDC: Final = "ACTION_ASSISTANT_OIDC_"
 _SECRET: Final = 65_536  # characters of such a file
 #: The folder of archives, inside the data folder.
@@ -131,10 +138,18 @@ _LOAD_RANGES: Final[Mapping[str, tuple[int, int]]] = {
 }
 
 
+class RunLink(msgspec.Struct, frozen=True):
+    """A link from each run on a robot to what another program recorded of it. `url`: with places such
+    as `{robot}` and `{from}`, which the page fills in."""
+
+    name: str
+    url: str
+
+
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
     `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS; `frames`: the origins of sites
-    that may show links to one thing in a frame; `oidc`: the values of the variables
+    that may show links to one thing in a frame; `run_links`: as in ACTION_ASSISTANT_RUN_LINKS; `oidc`: the values of the variables
     ACTION_ASSISTANT_OIDC_…"""
 
     data: Path
@@ -153,6 +168,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     sessions: str = ""
     token_days: float = TOKEN_DAYS
     frames: tuple[str, ...] = ()
+    run_links: tuple[RunLink, ...] = ()
     oidc: Mapping[str, str] = {}
     notifications: Path | None = None
     audit_days: float | None = None
@@ -343,6 +359,26 @@ def frame_origins(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
                 f"`https://wiki.lab.example`, not {each!r}."
             )
     return tuple(written)
+
+
+def run_links(environ: Mapping[str, str] = os.environ) -> tuple[RunLink, ...]:
+    """Return the links from runs to what other programs recorded of them, as the environment says them.
+    Raise CannotStart if one has no name, no web address, or a place that is not known."""
+    variable = "ACTION_ASSISTANT_RUN_LINKS"
+    found = []
+    for each in filter(str.strip, environ.get(variable, "").split(";")):
+        name, _, url = (part.strip() for part in each.partition("="))
+        if not name or len(name) > 40 or _WEB.fullmatch(url) is None:
+            raise CannotStart(
+                f"{variable} is a list of NAME=URL with `;` between them, where a URL begins with "
+                f"http:// or https:// and a host, not {each.strip()!r}."
+            )
+        for place in _PLACE.findall(url):
+            if place not in _PLACES:
+                places = ", ".join(f"{{{known}}}" for known in sorted(_PLACES))
+                raise CannotStart(f"{variable}: {{{place}}} is none of {places}.")
+        found.append(RunLink(name, url))
+    return tuple(found)
 
 
 def notifications(environ: Mapping[str, str] = os.environ) -> Path | None:

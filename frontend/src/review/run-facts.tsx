@@ -19,6 +19,7 @@ import { useDraft } from "../ui/drafts";
 import { clock, day, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import style from "./run-facts.module.css";
+import { recordedUrls, useRunLinks } from "./run-links";
 
 type Rest = NonNullable<Run["at_rest"]>;
 
@@ -27,6 +28,8 @@ interface Props {
   run: Run;
   version: string;
   by: string;
+  /** The moment that is shown, ms; null for the end, or now. */
+  at: number | null;
 }
 
 function restWords(rest: Rest, moment: (at: number | null) => string): string {
@@ -36,7 +39,35 @@ function restWords(rest: Rest, moment: (at: number | null) => string): string {
   return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 
-export function RunFacts({ runner, run, version, by }: Props) {
+/** What other programs recorded of the run on each robot, such as a video, at the moment that is shown. */
+function Recorded({ run, at }: Pick<Props, "run" | "at">) {
+  const links = useRunLinks();
+  const addresses = links.flatMap(({ name, url }) =>
+    recordedUrls(run, url, at).map(({ robot, href }) => ({ name, robot, href })),
+  );
+  if (addresses.length === 0) return null;
+  return (
+    <div>
+      <dt className="ink2">Kept elsewhere</dt>
+      <dd className="row-wrap gap-50">
+        {addresses.map(({ name, robot, href }) => (
+          <a
+            className="ink-accent"
+            key={`${name} ${robot}`}
+            href={href}
+            target="_blank"
+            rel="noopener noreferrer"
+          >
+            {name}
+            {run.robots ? ` of ${isolated(robot)}` : ""}
+          </a>
+        ))}
+      </dd>
+    </div>
+  );
+}
+
+export function RunFacts({ runner, run, version, by, at }: Props) {
   const raw = useRaw(runner, run).data;
   const now = useNow(60_000);
   const start = instant(run.started_at);
@@ -111,6 +142,7 @@ export function RunFacts({ runner, run, version, by }: Props) {
   ];
   return (
     <dl className={style.facts}>
+      <Recorded run={run} at={at} />
       {rows.map(([name, value]) => (
         <div key={`${name} ${value}`}>
           <dt className="ink2">{name}</dt>

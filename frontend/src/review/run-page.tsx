@@ -204,7 +204,7 @@ function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: 
         </Tabs.Panel>
         <Tabs.Panel value="facts" className="fill-y overflow-y-auto">
           <RunNotes runner={runner} run={newest.id} />
-          <RunFacts runner={runner} run={newest} version={label} by={by} />
+          <RunFacts runner={runner} run={newest} version={label} by={by} at={replay.at} />
         </Tabs.Panel>
         <Tabs.Panel value="raw" className="fill-y overflow-y-auto">
           <RawEvents runner={runner} run={newest} />

@@ -239,6 +239,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         sessions=settings.sessions(),
         token_days=settings.token_days(),
         frames=settings.frame_origins(),
+        run_links=settings.run_links(),
         oidc=settings.oidc(),
         notifications=settings.notifications(),
         audit_days=settings.audit_days(),

@@ -379,13 +379,14 @@ export interface EditorApi {
     /**
      * Config
      * @description The settings that a page asks for first. `runner_url` has no slash at its end. `commit`: the commit of
-     *     this program, null where it is unknown.
+     *     this program, null where it is unknown. `run_links`: from runs to what other programs recorded of them.
      */
     Config: {
         mode: string;
         version: string;
         runner_url: string;
         commit: string | null;
+        run_links: EditorApi["RunLink"][];
     };
     /**
      * ConfirmLogin
@@ -2255,6 +2256,15 @@ export interface EditorApi {
      */
     Ruling: {
         rule: EditorApi["Rule"] | null;
+    };
+    /**
+     * RunLink
+     * @description A link from each run on a robot to what another program recorded of it. `url`: with places such
+     *     as `{robot}` and `{from}`, which the page fills in.
+     */
+    RunLink: {
+        name: string;
+        url: string;
     };
     /**
      * Script

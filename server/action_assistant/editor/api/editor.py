@@ -18,6 +18,7 @@ from action_assistant.editor.log.inbox_events import inbox_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
+from action_assistant.settings import RunLink
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
 from action_assistant.web.audit.events import is_audit
@@ -33,12 +34,13 @@ _SILENCE: Final = 10.0  # seconds of silence after which a sign of life is sent
 
 class Config(msgspec.Struct, frozen=True):
     """The settings that a page asks for first. `runner_url` has no slash at its end. `commit`: the commit of
-    this program, null where it is unknown."""
+    this program, null where it is unknown. `run_links`: from runs to what other programs recorded of them."""
 
     mode: str
     version: str
     runner_url: str
     commit: str | None = None
+    run_links: tuple[RunLink, ...] = ()
 
 
 class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -82,10 +84,9 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         guards=[Needs("see")],
     )
     async def get_config(request: Request[Any, Any, Any]) -> Config:
-        runner = addresses.runner_at(
-            request.headers.get("host", ""), app_state.services.settings.runner_port
-        )
-        return Config("local", VERSION, runner, known)
+        settings = app_state.services.settings
+        runner = addresses.runner_at(request.headers.get("host", ""), settings.runner_port)
+        return Config("local", VERSION, runner, known, settings.run_links)
 
     @get(
         "/api/people",
