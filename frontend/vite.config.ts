@@ -140,7 +140,7 @@ function pageVersion(): Plugin {
 /** What the page shows of a font: its weights, distances between letters, and figures of one width. */
 const USED = {
   variationAxes: { wght: { min: 400, max: 700 } },
-  keepFeatures: ["kern", "locl", "tnum"],
+  keepFeatures: ["kern", "tnum"],
 };
 
 /** Return all characters of a list of ranges such as `U+0000-00FF,U+0131`. */

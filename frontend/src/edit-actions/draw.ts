@@ -8,7 +8,6 @@ import {
   IconCopy,
   IconCopyPlus,
   IconCut,
-  IconDeselect,
   IconFlag,
   IconLine,
   IconPackageExport,
@@ -16,7 +15,8 @@ import {
   IconPlayerPlay,
   IconPlus,
   IconRouteAltRight,
-  IconSelectAll,
+  IconSquareCheck,
+  IconSquareX,
   IconTrash,
 } from "@tabler/icons-react";
 import { relationId } from "../graph/document-keys";
@@ -224,7 +224,7 @@ export const selectAll: EditAction = {
   label: "Select all",
   group: "Draw",
   shortcuts: ["Mod+a"],
-  icon: IconSelectAll,
+  icon: IconSquareCheck,
   changes: false,
   enabled: anyAction,
   run: (context) => {
@@ -238,7 +238,7 @@ export const selectNone: EditAction = {
   label: "Select nothing",
   group: "Draw",
   shortcuts: ["Escape"],
-  icon: IconDeselect,
+  icon: IconSquareX,
   changes: false,
   enabled: always,
   run: (context) => {
