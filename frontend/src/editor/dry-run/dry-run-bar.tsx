@@ -364,7 +364,7 @@ export function DryRunBar({
       <div className={style.note}>
         <span>Nothing of this is recorded.</span>
         {run.part === null && <KeepDryRun run={run} />}
-        {record}
+        {run.part === null && record}
       </div>
     </section>
   );
