@@ -65,6 +65,7 @@ export function GraphView(props: Props) {
   const press = useMenuPress((screen) => {
     const id = nodeAt(screen) ?? arrowAt(screen);
     if (id !== null) onMenu?.(id, screen);
+    return id !== null;
   });
   const [lines] = useState(() => new LineStore());
   useEffect(() => lines.show(sceneOf(graph, options, lines.offset)), [lines, graph, options]);

@@ -13,14 +13,21 @@ import { keyOf } from "../ui/keys";
 const REST = 500; // ms
 const STILL = 8; // px that a resting finger may move
 
-/** Return the event handlers that call `open` with the place on the screen. */
-export function useMenuPress(open: (screen: Position) => void) {
+/** Return the event handlers that call `open` with the place on the screen; it returns whether there was a menu. */
+export function useMenuPress(open: (screen: Position) => boolean) {
   const now = useRef(open);
   now.current = open;
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   const start = useRef<Position>([0, 0]);
   const fingers = useRef(new Set<number>());
-  useEffect(() => () => clearTimeout(timer.current), []);
+  const lift = useRef<AbortController | null>(null);
+  useEffect(
+    () => () => {
+      clearTimeout(timer.current);
+      lift.current?.abort();
+    },
+    [],
+  );
   return useMemo(() => {
     const end = (event: PointerEvent) => {
       fingers.current.delete(event.pointerId);
@@ -32,11 +39,13 @@ export function useMenuPress(open: (screen: Position) => void) {
         if (event.pointerType === "mouse") return;
         fingers.current.add(event.pointerId);
         clearTimeout(timer.current);
-        const onText = (event.target as Element).closest("textarea, input, button") !== null;
+        lift.current?.abort();
+        const { pointerId, currentTarget: canvas } = event;
+        const pressed = event.target as Element;
+        const onText = pressed.closest("textarea, input, button") !== null;
         if (fingers.current.size > 1 || onText) return;
         timer.current = setTimeout(() => {
-          swallowClick();
-          now.current(start.current);
+          if (now.current(start.current)) lift.current = swallowClick(canvas, pressed, pointerId);
         }, REST);
       },
       onPointerMoveCapture(event: PointerEvent) {
@@ -74,23 +83,30 @@ export function menuKeyTarget(event: KeyboardEvent): { id: string; screen: Posit
   return { id, screen: [(left + right) / 2, (top + bottom) / 2] };
 }
 
-/** Suppresses the click that follows a long press, since it would close the menu. */
-function swallowClick(): void {
-  const kinds = ["mousedown", "mouseup", "click"] as const;
+/**
+ * Suppresses the click of one press on the canvas that has opened a menu, since it would close that. Nothing
+ * else is suppressed: no press elsewhere, as on STOP, and none by mouse or key while the finger still rests.
+ */
+function swallowClick(canvas: Element, pressed: Element, pointerId: number): AbortController {
+  const ending = new AbortController();
+  const options = { capture: true, signal: ending.signal };
   const swallow = (event: Event) => {
+    if (!canvas.contains(event.target as Node)) return;
     event.stopPropagation();
     event.preventDefault();
   };
-  const lift = (event: Event) => {
-    if (event.cancelable) event.preventDefault();
-    setTimeout(() => {
-      for (const kind of kinds) window.removeEventListener(kind, swallow, { capture: true });
-    }, 40);
+  const lifted = (event: globalThis.PointerEvent) => {
+    if (event.pointerId !== pointerId) return;
+    for (const kind of ["mousedown", "mouseup", "click"])
+      window.addEventListener(kind, swallow, options);
+    setTimeout(() => ending.abort(), 40);
   };
-  for (const kind of kinds) window.addEventListener(kind, swallow, { capture: true });
-  window.addEventListener("touchend", lift, { capture: true, passive: false, once: true });
-  window.addEventListener("touchcancel", lift, { capture: true, once: true });
-  // A pen sends no touch events: without these nothing could be clicked any more, Stop included.
-  window.addEventListener("pointerup", lift, { capture: true, once: true });
-  window.addEventListener("pointercancel", lift, { capture: true, once: true });
+  // A pen sends no touch events, and a finger sends these to what it pressed at first.
+  window.addEventListener("pointerup", lifted, options);
+  window.addEventListener("pointercancel", lifted, options);
+  const touchEnded = (event: TouchEvent) => {
+    if (event.target === pressed && event.cancelable) event.preventDefault();
+  };
+  window.addEventListener("touchend", touchEnded, { ...options, passive: false });
+  return ending;
 }

@@ -69,7 +69,8 @@ export function RunCanvasMenu({ run, graph, place, engines, onStart, onClose }: 
         {run.ended_at === null ? (
           <RunPoint run={run} graph={graph} id={place.id} />
         ) : (
-          action && (
+          action &&
+          hasRunMenu(run, graph, place.id) && (
             <RunFromHere
               {...{ run, engines, action: fullName(action) }}
               onStart={(again) => {

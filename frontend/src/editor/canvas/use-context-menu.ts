@@ -11,5 +11,6 @@ export function useContextMenu(context: EditorContext) {
     if (target === null) context.select([]);
     else if (!context.selection.has(target)) context.select([target]);
     context.openOverlay({ kind: "menu", screen });
+    return true;
   });
 }
