@@ -28,6 +28,8 @@ _OUTCOMES: Final[Mapping[Told, Precondition]] = {
     "false": "on_false",
     "error": "on_error",
 }
+#: The outcomes at which a run can wait, in order.
+TOLD: Final[tuple[Told, ...]] = tuple(_OUTCOMES)
 #: Responses by which the child of an arrow may begin, or the graph end.
 _GOES_ON: Final[frozenset[Response]] = frozenset({"run", "restart", "bypass"})
 
@@ -129,6 +131,13 @@ def goes_on(arrow: Relation) -> tuple[Told, ...]:
     """Return the outcomes by which an arrow lets its child begin, or the graph end."""
     return tuple(
         told for told, outcome in _OUTCOMES.items() if arrow.conditions.answer(outcome) in _GOES_ON
+    )
+
+
+def bypasses(arrow: Relation) -> tuple[Told, ...]:
+    """Return the outcomes by which an arrow bypasses its child: that hands them on and never begins."""
+    return tuple(
+        told for told, outcome in _OUTCOMES.items() if arrow.conditions.answer(outcome) == "bypass"
     )
 
 

@@ -145,6 +145,15 @@ async def test_a_repeated_start_of_an_opened_run_is_one_and_another_order_is_ref
 
 
 @virtual
+async def test_a_breakpoint_that_has_no_place_in_the_opened_graph_is_refused() -> None:
+    lab = Lab()
+    async with lab.runner() as control:
+        nowhere = (Breakpoint(action="Pick_0", to="Work_9"),)
+        with pytest.raises(BadInput, match="no place for a breakpoint after Pick_0"):
+            await control.start(opened(PICK, breakpoints=nowhere), ANN)
+
+
+@virtual
 async def test_a_sub_graph_that_is_not_known_to_do_the_same_is_not_opened() -> None:
     lab = Lab()
     ends_never = named(sequence("Pick", 2), "Work")

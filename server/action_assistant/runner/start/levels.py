@@ -46,9 +46,9 @@ def pinned_in(
     nobody waits there; `levels`: of a graph whose sub-graphs are opened. Raise BadInput for a breakpoint
     that has no place there."""
     wanted = tuple(each for each in breakpoints if not {each.action, each.to} & set(skipped))
-    if levels is not None and not skipped:
-        wanted = opened_breakpoints(OpenedGraph(graph, dict(levels)), wanted)
     try:
+        if levels is not None and not skipped:
+            wanted = opened_breakpoints(OpenedGraph(graph, dict(levels)), wanted)
         return pinned(graph, wanted)
     except NoSuchPlace as why:
         raise BadInput(str(why), where={"path": "/breakpoints"}) from why

@@ -5,16 +5,22 @@ remembers in which sub-graphs its actions stand, and takes the breakpoints of th
 docs/decisions/153-levels-are-opened-at-the-start.md.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Final, TypeAlias
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Final, NamedTuple, TypeAlias
 
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.umrf.breakpoints import Breakpoint, goes_on
+from action_assistant.umrf.breakpoints import (
+    TOLD,
+    Breakpoint,
+    NoSuchPlace,
+    Told,
+    bypasses,
+    goes_on,
+)
 from action_assistant.umrf.hierarchy.flattening import FlatOrigin, Flattened, flattened
 from action_assistant.umrf.model import ENTRY, EXIT, Graph
-from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.questions import is_asked
 
 #: The full names of the actions that stand for the sub-graphs around an action, the outermost first.
@@ -67,27 +73,53 @@ def _own_actor(origin: FlatOrigin, inside: Mapping[str, Graph]) -> str:
 def opened_breakpoints(
     found: OpenedGraph, breakpoints: Iterable[Breakpoint]
 ) -> tuple[Breakpoint, ...]:
-    """Return breakpoints for an opened graph. One before an action that is opened counts before each
-    action with which that begins, and one at its end at the end of each with which it ends. A value
-    that such an action does not have is no condition any more, so that the run waits more often, never
-    less."""
+    """Return breakpoints for an opened graph, one for each place. One before an action that is opened
+    counts before each action with which that begins, and one at its end at the end of each with which it
+    ends, or by which the last ones are bypassed. Visits and values of an action that is opened are no
+    condition inside, so that the run waits more often, never less. Raise NoSuchPlace for a breakpoint
+    for which nothing stands."""
     places = _Places(found)
-    translated = [one for each in breakpoints for one in places.translated(each)]
-    first: dict[tuple[str, str, bool], Breakpoint] = {}
-    for each in translated:
-        first.setdefault((each.action, each.to, each.is_at_end), each)
-    return tuple(first.values())
+    kept: dict[tuple[str, str, bool], Breakpoint] = {}
+    for each in breakpoints:
+        translated = tuple(places.translated(each))
+        if not translated:
+            raise NoSuchPlace(
+                f"With its sub-graphs opened, the graph has no place for a breakpoint {each.words()}."
+            )
+        for one in translated:
+            place = (one.action, one.to, one.is_at_end)
+            kept[place] = _either(kept[place], one) if place in kept else one
+    return tuple(kept.values())
+
+
+def _either(one: Breakpoint, other: Breakpoint) -> Breakpoint:
+    """Return a breakpoint for the place of these two that waits wherever one of them does."""
+    both = {*one.outcomes, *other.outcomes} if one.outcomes and other.outcomes else set[Told]()
+    return replace(
+        one,
+        visit=one.visit if one.visit == other.visit else 0,
+        outcomes=tuple(each for each in TOLD if each in both),
+        value=one.value if one.value == other.value else None,
+    )
+
+
+class _Arrow(NamedTuple):
+    """An arrow by the full names of its ends. `goes_on`, `bypasses`: the outcomes by which it does."""
+
+    by: str
+    to: str
+    goes_on: Collection[Told]
+    bypasses: Collection[Told]
 
 
 class _Places:
     """Finds the places of an opened graph that stand for a place of the graph."""
 
     def __init__(self, found: OpenedGraph) -> None:
-        self._actions = {each.full_name: each for each in found.graph.actions}
         names = {each.key: each.full_name for each in found.graph.actions}
         names |= {ENTRY: ENTRY, EXIT: EXIT}
         self._arrows = [
-            (names[each.parent], names[each.child], frozenset(goes_on(each)))
+            _Arrow(names[each.parent], names[each.child], goes_on(each), bypasses(each))
             for each in found.graph.relations
         ]
         self._within: dict[str, set[str]] = {}
@@ -96,31 +128,51 @@ class _Places:
 
     def translated(self, each: Breakpoint) -> Iterator[Breakpoint]:
         """Yield the breakpoints that stand for one of the graph."""
-        own, other = (self._within.get(name, {name}) for name in (each.action, each.to))
-        if own == {each.action} and other == {each.to}:
-            yield each
-        elif each.to:
-            yield from self._on_arrows(each, own, other)
-        elif each.is_at_end:
-            for name in sorted(self._last(own)):
-                yield self._at(each, name)
+        own, other = self._within.get(each.action), self._within.get(each.to, {each.to})
+        if own is None:
+            yield from self._from_plain(each, other)
+            return
+        at = replace(each, visit=0, value=None)
+        if not each.is_at_end:
+            into = {one.to for one in self._arrows if one.to in own and one.by not in own}
+            for name in sorted(into):
+                yield replace(at, action=name)
+            return
+        out = [one for one in self._arrows if one.by in own and one.to not in own]
+        if each.to:
+            out = [one for one in out if one.to in other]
+            for one in out:
+                if set(one.goes_on) & set(each.outcomes or TOLD):
+                    yield replace(at, action=one.by, to=one.to)
         else:
-            firsts = {to for by, to, _ in self._arrows if to in own and by not in own}
-            for name in sorted(firsts):
-                yield self._at(each, name)
+            for name in sorted({one.by for one in out}):
+                yield replace(at, action=name)
+        for told in each.outcomes or TOLD:
+            last = {one.by for one in out if not each.to or told in one.goes_on}
+            for name in sorted(self._bypassing(own, last, told)):
+                yield replace(at, action=name, to="", outcomes=(told,))
 
-    def _on_arrows(self, each: Breakpoint, own: set[str], other: set[str]) -> Iterator[Breakpoint]:
-        for by, to, outcomes in self._arrows:
-            if by in own and to in other and outcomes & set(each.outcomes or outcomes):
-                yield self._at(each, by, to)
+    def _from_plain(self, each: Breakpoint, other: set[str]) -> Iterator[Breakpoint]:
+        """Yield what stands for a breakpoint of an action that is not opened."""
+        if other == {each.to}:
+            yield each
+            return
+        for one in self._arrows:
+            is_there = one.by == each.action and one.to in other
+            if is_there and set(one.goes_on) & set(each.outcomes or TOLD):
+                yield replace(each, to=one.to)
 
-    def _last(self, own: set[str]) -> set[str]:
-        return {by for by, to, outcomes in self._arrows if by in own and to not in own and outcomes}
-
-    def _at(self, each: Breakpoint, action: str, to: str = "") -> Breakpoint:
-        value, there = each.value, self._actions[action]
-        if value is not None:
-            slots = there.outputs if each.is_at_end else there.inputs
-            if value.name not in {flat_name(one.path) for one in slots}:
-                value = None
-        return replace(each, action=action, to=to, value=value)
+    def _bypassing(self, own: set[str], last: set[str], told: Told) -> set[str]:
+        """Return the actions inside (of `own`) that end it by an end `told` of theirs, since that
+        bypasses what follows them, up to one of `last`."""
+        found: set[str] = set()
+        while (
+            more := {
+                one.by
+                for one in self._arrows
+                if one.by in own and one.to in found | last and told in one.bypasses
+            }
+            - found
+        ):
+            found |= more
+        return found
