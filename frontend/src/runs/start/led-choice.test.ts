@@ -1,7 +1,17 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Robot } from "../../api/robots";
-import { actorsIn, castObstacle, castOf, movesWords, whyOff } from "./led-choice";
+import { rolesIn } from "../../graph/questions";
+import {
+  actionsInside,
+  actorsIn,
+  castObstacle,
+  castOf,
+  marksInsideWords,
+  marksObstacle,
+  movesWords,
+  whyOff,
+} from "./led-choice";
 
 const robot = (name: string, part: object = {}) =>
   ({ name, simulated: false, led: true, state: "answering", ...part }) as Robot;
@@ -35,6 +45,23 @@ test.each([
   expect(actorsIn(top, [named("Sub", ...within)])).toEqual(found);
   const deep = { name: "Sub", umrf: umrf("").replace('"Do"', '"Deep"') };
   expect(actorsIn(top, [deep, named("Deep", ...within)])).toEqual(found);
+});
+
+test("the questions inside of sub-graphs ask their roles, at each level", () => {
+  const asking = (actor: string) => ({ name: "AaConfirm", instance_id: 0, actor });
+  const inside = [
+    { name: "Pick", umrf: { actions: [asking("Cook"), { name: "Do", instance_id: 0 }] } },
+    { name: "Deep", umrf: JSON.stringify({ actions: [asking("Guard")] }) },
+  ];
+  expect(rolesIn(actionsInside(inside))).toEqual(["Cook", "Guard"]);
+  expect(actionsInside(null)).toEqual([]);
+});
+
+test("breakpoints inside of sub-graphs keep these from being opened until they are gone", () => {
+  expect(marksObstacle(undefined)).toBe("Looking …");
+  expect(marksObstacle(["Pick"])).toBe("There are breakpoints inside");
+  expect(marksObstacle([])).toBeNull();
+  expect(marksInsideWords(["Pick", "Place"])).toMatch(/^Breakpoints inside of .*Pick.*, .*Place/);
 });
 
 test("levels that double are read once for each actor, and a graph inside of itself is no circle", () => {

@@ -23,6 +23,13 @@ type Cast = LedOrder["robots"];
 const real = (actions: readonly Action[]) =>
   actions.filter((action) => !action.missing && !isReadyMade(action));
 
+/** Return the actions of the graphs inside. */
+export function actionsInside(inside: Inside["subgraphs"] | null): Action[] {
+  return (inside ?? []).flatMap(
+    ({ umrf }) => fromUmrf(typeof umrf === "string" ? JSON.parse(umrf) : umrf).actions,
+  );
+}
+
 /**
  * Return the actors of a graph, "" (actions that name none) last; empty while its text, or the graphs
  * inside, are not there. An action that stands for a graph has the actors of the actions inside; one of
@@ -149,13 +156,28 @@ export function WayChoice({ led, several, onLed }: WayProps) {
   );
 }
 
+/** Return what breakpoints inside of these graphs mean for a start that opens them; "" for none. */
+export function marksInsideWords(names: readonly string[]): string {
+  if (names.length === 0) return "";
+  const where = `${names.slice(0, 3).map(isolated).join(", ")}${names.length > 3 ? " and others" : ""}`;
+  return `Breakpoints inside of ${where} do not hold when sub-graphs are opened: remove them, or start with sub-graphs as one step each.`;
+}
+
+/** Return why nothing is started that opens sub-graphs, of which these have breakpoints; null if it may be. */
+export function marksObstacle(marked: readonly string[] | undefined): string | null {
+  if (marked === undefined) return "Looking …";
+  return marked.length > 0 ? "There are breakpoints inside" : null;
+}
+
 interface LevelsChoiceProps {
   opened: boolean;
+  /** The graphs inside that have breakpoints of their own. */
+  marked: readonly string[];
   onOpened: (opened: boolean) => void;
 }
 
 /** The choice between sub-graphs that are one step each, and the actions inside as steps. */
-export function LevelsChoice({ opened, onOpened }: LevelsChoiceProps) {
+export function LevelsChoice({ opened, marked, onOpened }: LevelsChoiceProps) {
   const ways = [
     [false, "One step each: a robot gets the whole sub-graph at once"],
     [true, "Opened: each action inside is a step of its own"],
@@ -176,6 +198,11 @@ export function LevelsChoice({ opened, onOpened }: LevelsChoiceProps) {
           </label>
         ))}
       </div>
+      {opened && marked.length > 0 && (
+        <Text size="sm" className="ink-warn" role="alert">
+          {marksInsideWords(marked)}
+        </Text>
+      )}
     </fieldset>
   );
 }

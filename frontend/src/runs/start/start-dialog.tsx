@@ -7,7 +7,7 @@ import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
 import { fetchDocument } from "../../api/history";
 import { errorText } from "../../api/http";
-import { fetchInside } from "../../api/inside";
+import { fetchInside, useMarkedInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay, usePerson } from "../../api/people";
@@ -33,11 +33,13 @@ import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import { useAskedValues, ValueList } from "./asked-values";
 import {
+  actionsInside,
   actorsIn,
   castObstacle,
   castOf,
   LedChoice,
   LevelsChoice,
+  marksObstacle,
   movesWords,
   PeopleChoice,
   WayChoice,
@@ -313,9 +315,6 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
     [text.data],
   );
   const asks = own.some(isReadyMade);
-  const roles = useMemo(() => rolesIn(own), [own]);
-  const [answering, setAnswering] = useState<LedOrder["people"]>(before?.people);
-  const people = Object.fromEntries(roles.map((role) => [role, answering?.[role] ?? ""]));
   const [wanted, want] = useState<boolean | null>(chosen.includes(CONDUCTED) ? true : null);
   const mayLead = now.engines.some((robot) => robot.led);
   const waits = (marks.data?.length ?? 0) > 0;
@@ -325,10 +324,19 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const cast = castOf(actors, picked, now.engines, may);
   const [opens, setOpens] = useState(before?.levels === "opened");
   const mayOpen = led && beginning === undefined && (graphs?.length ?? 0) > 0;
+  const opened = mayOpen && opens;
+  const marked = useMarkedInside(graph, seq, opened);
+  const unheld = opened ? marksObstacle(marked.data) : null;
+  const roles = useMemo(
+    () => rolesIn(opened ? [...own, ...actionsInside(graphs)] : own),
+    [own, opened, graphs],
+  );
+  const [answering, setAnswering] = useState<LedOrder["people"]>(before?.people);
+  const people = Object.fromEntries(roles.map((role) => [role, answering?.[role] ?? ""]));
   const needsNone = actors.length === 0 && asks && graphs !== null;
   const missing = led && !needsNone ? castObstacle(actors, cast) : null;
-  const way = { text, marks, actors, several, led, want, offered };
-  const levels = { mayOpen, opened: mayOpen && opens, setOpens };
+  const way = { text, marked, marks, actors, several, led, want, offered };
+  const levels = { mayOpen, opened, unheld, setOpens };
   return { ...way, ...levels, cast, pick, lost, setLost, missing, roles, people, setAnswering };
 }
 
@@ -371,7 +379,7 @@ export function StartDialog(props: Props) {
   const values = beginning?.at.length === 0 ? (props.values ?? {}) : given.values;
   const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints, values, from };
   const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
-  const error = way.text.error ?? way.marks.error ?? given.error ?? lookError;
+  const error = way.text.error ?? way.marks.error ?? way.marked.error ?? given.error ?? lookError;
   const start = useStart(graph);
   const mayMove = engines.some((engine) => engine !== SIMULATOR);
   const repeats = useRepeatChoice(given.asked, mayMove, `${textScope(graph, person.id)}repeat`);
@@ -388,6 +396,7 @@ export function StartDialog(props: Props) {
       : start.isPending || open.isPending
         ? "Starting …"
         : (way.missing ??
+          way.unheld ??
           given.obstacle ??
           watch.obstacle ??
           begins.obstacle(earlier) ??
@@ -417,7 +426,10 @@ export function StartDialog(props: Props) {
       ? "A start like this cannot wait"
       : asked.length > 1
         ? "One robot, or a led run, can wait"
-        : (way.missing ?? given.obstacle ?? (look.isPlaceholderData ? "Looking …" : null));
+        : (way.missing ??
+          way.unheld ??
+          given.obstacle ??
+          (look.isPlaceholderData ? "Looking …" : null));
   const begin = () => {
     rememberEngines(graph, asked);
     if (order !== null) rememberLed(graph, order);
@@ -489,6 +501,7 @@ export function StartDialog(props: Props) {
       {way.mayOpen && (
         <LevelsChoice
           opened={way.opened}
+          marked={way.marked.data ?? []}
           onOpened={(opened) => {
             setReason("");
             way.setOpens(opened);
