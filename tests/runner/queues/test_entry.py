@@ -31,6 +31,18 @@ def test_one_of_several_checks_of_a_robot_that_is_worse_now_is_said() -> None:
 
     before, now = look("passed", "passed"), look("warned", "passed")
     seen = looked_of(before, {})
-    assert digest_of(seen) != digest_of(looked_of(now, {}))
+    assert digest_of(seen, before, 1) != digest_of(looked_of(now, {}), now, 1)
     assert differences(seen, looked_of(now, {}), now) == ("It is warned.",)
     assert differences(seen, seen, before) == ()
+
+
+def test_a_look_is_another_one_when_what_was_unknown_is_bad_or_at_another_turn() -> None:
+    def digest(text: str, ready_at: int = 1) -> str:
+        item = Item(code="health", verdict="warned", text=text)
+        look = [Preflight("David", "", "", (item,), (), False)]
+        return digest_of(looked_of(look, {}), look, ready_at)
+
+    unknown = digest("The battery is unknown: the newest message is 31.5 s old.")
+    assert unknown == digest("The battery is unknown: the newest message is 36 s old.")
+    assert unknown != digest("The battery has 4 %.")
+    assert unknown != digest("The battery is unknown: the newest message is 36 s old.", 2)

@@ -5,6 +5,7 @@ Its stream `queue/ID` says who put it there, what was looked at, and how it left
 """
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, ClassVar, Final, Literal, TypeAlias
@@ -35,6 +36,8 @@ _OF_THE_MOMENT: Final = frozenset(
 )
 #: Of these, those that may be missing when a queue is opened: nothing starts by that.
 _AT_THE_START: Final = frozenset({"free", "confirm", "watched", "present", "approved"})
+#: Figures change by themselves between two looks: ages, levels of a battery.
+_FIGURE: Final = re.compile(r"\d+([.,]\d+)*")
 _WORSE: Final = {"passed": 0, "warned": 1, "blocked": 2}
 
 _Id = Annotated[str, msgspec.Meta(max_length=100)]
@@ -205,6 +208,16 @@ def request_of(entry: str) -> str:
     return f"{_PREFIX}{entry}"
 
 
+def told(closed: QueueClosed, *, whole: bool = False) -> str:
+    """Return why a queue is closed. Without `whole` it leaves out the details of a run or of a refused
+    start, which may speak of a graph that the reader may not see."""
+    if not whole and closed.why == "refused":
+        return "A start of it was refused."
+    if not whole and closed.why == "lost" and closed.run:
+        return "A run on it was lost."
+    return closed.text
+
+
 def order_of(request: QueueRequest) -> str:
     """Return the hash of all that an entry orders."""
     return hashlib.sha256(ordered_in(request.start) + b"%d" % request.by_itself).hexdigest()
@@ -245,9 +258,17 @@ def _counted(look: Preflight) -> Iterator[tuple[str, Item]]:
             yield item.code if number == 1 else f"{item.code} {number}", item
 
 
-def digest_of(looked: Looked) -> str:
-    """Return the digest by which a person says what they have looked at."""
-    return hashlib.sha256(msgspec.json.encode(looked, order="deterministic")).hexdigest()[:22]
+def digest_of(looked: Looked, looks: Sequence[Preflight], ready_at: int | None) -> str:
+    """Return the digest by which a person says what they have looked at: it is another one when an item
+    says something else, figures aside, as when what was unknown becomes bad, and at another turn.
+    `looked`: what counts of `looks`; `ready_at`: since when it is the turn, µs UTC, None before."""
+    said = [
+        (look.engine, name, _FIGURE.sub("#", item.text), item.codes)
+        for look in looks
+        for name, item in _counted(look)
+    ]
+    text = msgspec.json.encode((looked, said, ready_at), order="deterministic")
+    return hashlib.sha256(text).hexdigest()[:22]
 
 
 def differences(seen: Looked, now: Looked, looks: Sequence[Preflight]) -> tuple[str, ...]:

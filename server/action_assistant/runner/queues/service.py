@@ -54,6 +54,7 @@ from action_assistant.runner.queues.entry import (
     require_waitable,
     stream_of,
     stream_of_robot,
+    told,
 )
 from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
 from action_assistant.runner.runs import queries
@@ -160,6 +161,12 @@ class Queues:
         """Return whether the start with this request id is being put into the queue at this moment."""
         return self._putting[request_id] > 0
 
+    def is_starting(self, request_id: str) -> bool:
+        """Return whether the start of an entry, with this request id, is looked at or sent at this moment."""
+        return any(
+            request_of(each.id) == request_id and each.turn.locked() for each in self._entries
+        )
+
     async def queued(self, request_id: str) -> QueuedStart | None:
         """Return the entry that the start with this request id has become; None if it has become none.
         Raise Unavailable if the journal cannot be read."""
@@ -177,20 +184,22 @@ class Queues:
         return msgspec.structs.replace(start, request_id=request_of(entry.id), watching=watching)
 
     async def _look(
-        self, start: StartRequest, seen: Looked, identity: Identity
+        self, start: StartRequest, seen: Looked, identity: Identity, ready_at: int | None = None
     ) -> tuple[Look, Looked]:
         looks = await self._control.look(group_of(start), identity.person.id, identity)
         rules = {name: self._control.rights.of(name).rules for name in engines_of(start)}
         now = looked_of(looks, rules)
         differs = differences(seen, now, looks)
-        return Look(tuple(looks), differs, digest_of(now), overridden_in(start)), now
+        digest = digest_of(now, looks, ready_at)
+        return Look(tuple(looks), differs, digest, overridden_in(start)), now
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
         """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
         wait, Forbidden if they may not see its graph."""
         entry = self.find(id_)
         start = await self._start_in(entry, watching)
-        return (await self._look(start, entry.entered.seen, identity))[0]
+        self._survey()
+        return (await self._look(start, entry.entered.seen, identity, entry.ready_at))[0]
 
     # --- put, move, remove --------------------------------------------------------------------
 
@@ -475,7 +484,7 @@ class Queues:
             if entry not in self._entries:
                 return await self._started(id_)
             start = await self._start_in(entry, asked.watching)
-            look, _ = await self._look(start, entry.entered.seen, identity)
+            look, _ = await self._look(start, entry.entered.seen, identity, ready_at)
             if look.digest != asked.look:
                 text = "It is not as you have looked at it. Look again."
                 if look.differs:
@@ -502,7 +511,7 @@ class Queues:
             closed = self._queues[each.robot].closed if each.why == "closed" else None
             where: dict[str, object] = {"robot": each.robot, "why": each.why}
             if closed is not None:
-                text = f"The queue of {named(each.robot)} is closed. {closed.text}"
+                text = f"The queue of {named(each.robot)} is closed. {told(closed)}"
                 raise Conflict(text, where=where | {"closing": closing_of(closed)})
             if each.why == "behind":
                 raise Conflict(
@@ -593,7 +602,7 @@ class Queues:
         closed, before = queue.closed, queue.doubts
         if asked.closing != closing_of(closed):
             where: dict[str, object] = {"path": "/closing", "closing": closing_of(closed)}
-            raise Conflict(f"It was closed again meanwhile. {closed.text}", where=where)
+            raise Conflict(f"It was closed again meanwhile. {told(closed)}", where=where)
         self._require_settled(robot)
         standing = self._doubts.standing(queue)
         entry = self._first_seen(queue, identity)

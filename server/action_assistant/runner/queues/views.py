@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 
 from action_assistant.runner.links.port import SIMULATOR
-from action_assistant.runner.queues.entry import QueueClosed, Wait, Waiting, named
+from action_assistant.runner.queues.entry import Wait, Waiting, named, told
 from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
 from action_assistant.runner.queues.service import Queues, closing_of
 from action_assistant.runner.runs.doubts import ClosedWhy
@@ -175,9 +175,7 @@ def _waiting(
     match wait.why:
         case "closed":
             closed = robot_queues[robot].closed
-            text = (
-                f"The queue of {name} is closed. {'' if closed is None else _why(closed, unseen)}"
-            )
+            text = f"The queue of {name} is closed. {'' if closed is None else told(closed, whole=unseen is None)}"
         case "behind":
             others = "1 other" if wait.behind == 1 else f"{wait.behind} others"
             text = f"It is behind {others} for {name}."
@@ -205,16 +203,6 @@ def _running(robot: str, run: Run, unseen: Unseen | None) -> str:
     return f"{robot} is running {graph}, by {who}."
 
 
-def _why(closed: QueueClosed, unseen: Unseen | None) -> str:
-    """Return why a queue is closed. Details of a run or of a refused start may speak of a graph that the
-    reader may not see."""
-    if unseen is not None and closed.why == "refused":
-        return "A start of it was refused."
-    if unseen is not None and closed.why == "lost" and closed.run:
-        return "A run on it was lost."
-    return closed.text
-
-
 def _closed(queue: RobotQueue, unseen: Unseen | None) -> QueueClosedShown | None:
     closed = queue.closed
     if closed is None:
@@ -222,7 +210,7 @@ def _closed(queue: RobotQueue, unseen: Unseen | None) -> QueueClosedShown | None
     return QueueClosedShown(
         closing=closing_of(closed),
         why=closed.why,
-        text=_why(closed, unseen),
+        text=told(closed, whole=unseen is None),
         at=time(closed.at),
         by=closed.by,
         run=closed.run or None,
