@@ -20,7 +20,7 @@ import { runMarks } from "../graph/breakpoints";
 import type { Key, Position } from "../graph/model";
 import { Answers } from "../status/answers";
 import { RunQuestions } from "../status/held-notice";
-import { type TimeRange, turnedTo } from "../status/lanes/axis";
+import { rangeOf, type TimeRange, turnedTo } from "../status/lanes/axis";
 import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
 import { Timeline, type Track } from "../status/lanes/timeline";
 import { INTO } from "../status/level-places";
@@ -72,45 +72,49 @@ interface Props {
   start: (again: RepeatActions, onClose: () => void) => ReactNode;
 }
 
+/** The moment from which addresses count, ms: the start of a run, or the request for it. */
+const originOf = (run: Run): number => instant(run.started_at) ?? instant(run.requested_at) ?? 0;
+
+const FURTHEST = 1e12; // ms, further than any run is long
+
 /** The moment to which a link points, in ms after the start. */
 function momentAsked(run: Run, search: string): number | null {
-  const t = new URLSearchParams(search).get("t");
-  const start = instant(run.started_at);
-  return t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
+  const t = Number(new URLSearchParams(search).get("t") ?? Number.NaN);
+  const isGood = instant(run.started_at) !== null && Math.abs(t) < FURTHEST;
+  return isGood ? originOf(run) + t : null;
 }
 
-/** The part of the time to which a link points; null for all of it. */
-function rangeAsked(search: string): TimeRange | null {
+/** The part of the time to which a link points, in ms after the start; null for all of it. */
+function rangeAsked(run: Run, search: string): TimeRange | null {
   const query = new URLSearchParams(search);
-  const [from, until] = ["from", "until"].map((name) => Number(query.get(name) ?? Number.NaN));
-  return from !== undefined && until !== undefined && from >= 0 && until > from
-    ? { from, until }
-    : null;
+  const moment = (name: string) => originOf(run) + Number(query.get(name) ?? Number.NaN);
+  return rangeOf(moment("from"), moment("until"));
 }
 
 /** The part of the time that is shown: it goes on like pages with the replay. */
-function useTimeRange({ at, start }: ReplayCursor, search: string) {
-  const [range, setRange] = useState(() => rangeAsked(search));
-  const shown = range === null || at === null ? range : turnedTo(range, at - start);
+function useTimeRange(run: Run, { at }: ReplayCursor, search: string) {
+  const [range, setRange] = useState(() => rangeAsked(run, search));
+  const shown = range === null || at === null ? range : turnedTo(range, at);
   if (shown !== range) setRange(shown);
   return [shown, setRange] as const;
 }
 
 /** Keeps the address in step, so that it can be sent to somebody. */
 function useAddress(
-  id: string,
-  replay: ReplayCursor,
+  run: Run,
+  { at, playing }: ReplayCursor,
   { way, key }: LevelCursor,
   range: TimeRange | null,
 ): void {
-  const { at, start, playing } = replay;
+  const { id } = run;
+  const start = originOf(run);
   useEffect(() => {
     const query = new URLSearchParams();
     for (const { graph, action } of way) query.append("in", `${graph}~${action}`);
     if (at !== null) query.set("t", String(Math.round(at - start)));
     if (key !== null) query.set("action", key);
-    if (range !== null) query.set("from", String(range.from));
-    if (range !== null) query.set("until", String(range.until));
+    if (range !== null) query.set("from", String(range.from - start));
+    if (range !== null) query.set("until", String(range.until - start));
     const search = query.size > 0 ? `?${query}` : "";
     if (playing) return; // browsers refuse an address that changes with every frame
     window.history.replaceState(window.history.state, "", `/runs/${id}${search}`);
@@ -341,8 +345,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const replay = useReplay(runner, newest, until, momentAsked(newest, search));
   const { run } = replay;
   const past = replay.at !== null;
-  const [range, setRange] = useTimeRange(replay, search);
-  useAddress(newest.id, replay, level, range);
+  const [range, setRange] = useTimeRange(newest, replay, search);
+  useAddress(newest, replay, level, range);
   const unheard = useUnsure(newest);
   const seen = useProgress(run, !past && unheard, replay.at, level.inside);
   const progress = useMemo(() => withWaits(level.graph, seen), [level.graph, seen]);

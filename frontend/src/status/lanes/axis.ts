@@ -15,7 +15,7 @@ export interface TimeAxis {
   readonly origin?: number;
 }
 
-/** A part of a run, ms after its start. */
+/** A part of the time of a run, ms. */
 export interface TimeRange {
   readonly from: number;
   readonly until: number;
@@ -23,14 +23,25 @@ export interface TimeRange {
 
 /** The shortest part that is shown, ms: clocks of robots are not better than that. */
 const SHORTEST = 1000;
+/** Longer than any run, ms. */
+const LONGEST = 1e12;
+
+/** Return a part of the time that an address names; null for one that cannot be shown. */
+export function rangeOf(from: number, until: number): TimeRange | null {
+  const isGood =
+    Number.isInteger(from) &&
+    until - from >= SHORTEST &&
+    until - from < LONGEST &&
+    Math.abs(from) < 4 * LONGEST;
+  return isGood ? { from, until } : null;
+}
 
 /** Return the axis of a part of what an axis shows; `null`, and a part that is not on it, is the whole. */
 export function partOf(axis: TimeAxis, range: TimeRange | null): TimeAxis {
   const { start: origin, span } = axis;
-  const from = range?.from ?? 0;
-  const until = Math.min(range?.until ?? span, span);
-  const isPart = until - from < span && until - from > 0;
-  return isPart ? { start: origin + from, span: until - from, origin } : axis;
+  const from = Math.max(range?.from ?? origin, origin);
+  const length = Math.min(range?.until ?? origin + span, origin + span) - from;
+  return length > 0 && length < span ? { start: from, span: length, origin } : axis;
 }
 
 /** Return the start of the run, ms, from which the moments of an axis are counted. */
@@ -39,30 +50,31 @@ export function originOf(axis: TimeAxis): number {
 }
 
 /**
- * Return the part that is `factor` times as long, with `around` at the same place; null for the whole.
- * All in ms after the start of a run that takes `whole`.
+ * Return the part of `whole` that is `factor` times as long, with the moment `around` at the same place;
+ * null for all of it.
  */
 export function zoomed(
   range: TimeRange | null,
-  whole: number,
+  whole: TimeAxis,
   around: number,
   factor: number,
 ): TimeRange | null {
-  const { from, until } = range ?? { from: 0, until: whole };
+  const end = whole.start + whole.span;
+  const { from, until } = range ?? { from: whole.start, until: end };
   const length = Math.max(SHORTEST, (until - from) * factor);
-  if (length >= whole) return null;
+  if (length >= whole.span) return null;
   const share = (Math.min(until, Math.max(from, around)) - from) / (until - from);
   const wanted = from + share * (until - from - length);
-  const begin = Math.round(Math.min(whole - length, Math.max(0, wanted)));
+  const begin = Math.round(Math.min(end - length, Math.max(whole.start, wanted)));
   return { from: begin, until: Math.round(begin + length) };
 }
 
-/** Return a part of the same length that holds the moment `at`, ms after the start, like the next page. */
+/** Return a part of the same length that holds a moment, like the page of a book. */
 export function turnedTo(range: TimeRange, at: number): TimeRange {
-  const length = range.until - range.from;
   if (at >= range.from && at <= range.until) return range;
+  const length = range.until - range.from;
   const from = range.from + Math.floor((at - range.from) / length) * length;
-  return { from: Math.max(0, from), until: Math.max(0, from) + length };
+  return { from, until: from + length };
 }
 
 /** Return whether a time that begins and ends at these moments, ms, is on an axis at least in part. */

@@ -369,9 +369,9 @@ interface ZoomProps extends Required<Pick<Props, "cursor" | "range" | "onRange">
 
 /** Show half of what is shown, around the chosen moment, or twice as much. */
 function Zoom({ whole, cursor, range, onRange, isLive }: ZoomProps) {
-  const { from, until } = range ?? { from: 0, until: whole.span };
-  const around = cursor === null ? (from + until) / 2 : cursor - whole.start;
-  const closer = zoomed(range, whole.span, around, 0.5);
+  const { from, until } = range ?? { from: whole.start, until: whole.start + whole.span };
+  const around = cursor ?? (from + until) / 2;
+  const closer = zoomed(range, whole, around, 0.5);
   const isCloser = !isLive && closer !== null && closer.until - closer.from < until - from;
   return (
     <span className={style.zoom}>
@@ -390,7 +390,7 @@ function Zoom({ whole, cursor, range, onRange, isLive }: ZoomProps) {
           size={24}
           aria-label="Zoom out of the time"
           aria-disabled={isLive || range === null || undefined}
-          onClick={() => isLive || onRange(zoomed(range, whole.span, around, 2))}
+          onClick={() => isLive || onRange(zoomed(range, whole, around, 2))}
         >
           <IconZoomOut size={15} aria-hidden />
         </ActionIcon>
