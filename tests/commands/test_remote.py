@@ -255,16 +255,16 @@ async def until(true: Callable[[], bool]) -> None:
 
 
 def test_a_stop_insists_where_connections_break() -> None:
-    """The first two are closed without an answer."""
+    """The first two are closed without an answer, and a proxy answers the third."""
+    proxy = b"HTTP/1.1 504 Gateway Timeout\r\ncontent-length: 0\r\nconnection: close\r\n\r\n"
     answer = b'HTTP/1.1 200 OK\r\ncontent-length: 11\r\n\r\n{"runs":[]}'
 
     def serve() -> None:
-        for number in range(3):
+        for said in (b"", b"", proxy, answer):
             connection, _ = listener.accept()
             with connection:
                 connection.recv(65_536)
-                if number == 2:
-                    connection.sendall(answer)
+                connection.sendall(said)
 
     with socket.create_server(("127.0.0.1", 0)) as listener, ThreadPoolExecutor(1) as runner:
         serving = runner.submit(serve)

@@ -31,6 +31,7 @@ _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", 
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
 _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
+_NOBODY_ANSWERS: Final = frozenset({502, 503, 504})  # statuses of a proxy that reaches nobody
 _STOP_ANSWER_S: Final = 10.0  # after which a runner that is silent about a Stop is called silent
 _LOOK_AT_ROBOT: Final = "Look at the robot; use its hardware stop."
 
@@ -493,16 +494,21 @@ def verdict(run: "RunShown") -> tuple[int, str]:
 
 def insisting(server: Server, method: str, path: str) -> Any:
     """Send a request about a Stop to the runner and return the answer's JSON; repeat it while the
-    connection fails. Raise RequestRefused if it is refused, CannotStart after some seconds without
-    an answer."""
+    connection fails, or a proxy says that nobody answers. Raise RequestRefused if it is refused,
+    CannotStart after some seconds without an answer."""
     deadline = time.monotonic() + _INSIST_S
     while True:
         try:
             return server.runner(method, path, timeout=_STOP_ANSWER_S).json()
-        except CannotStart:
-            if time.monotonic() > deadline:
+        except RequestRefused as error:
+            if error.status not in _NOBODY_ANSWERS:
                 raise
-            time.sleep(_POLL)
+            silence = CannotStart(str(error))
+        except CannotStart as error:
+            silence = error
+        if time.monotonic() > deadline:
+            raise silence
+        time.sleep(_POLL)
 
 
 def _stop(options: argparse.Namespace) -> int:
