@@ -225,20 +225,22 @@ const unanswered = new Map<string, string>();
 
 /**
  * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
- * thing is sent with the same id, so that the two count once.
+ * thing is sent with the same id, so that the two count once: also one after a press that was refused
+ * meanwhile, since the first may still be carried out.
  */
 export async function sendPress<T>(
   what: string,
   send: (request: string) => Promise<T>,
 ): Promise<T> {
-  const request = unanswered.get(what) ?? newAid();
+  const lost = unanswered.get(what);
+  const request = lost ?? newAid();
   unanswered.set(what, request);
   try {
     const answer = await send(request);
     unanswered.delete(what);
     return answer;
   } catch (error) {
-    if (!isOutcomeUnknown(error)) unanswered.delete(what);
+    if (lost === undefined && !isOutcomeUnknown(error)) unanswered.delete(what);
     throw error;
   }
 }

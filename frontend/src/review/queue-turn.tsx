@@ -88,10 +88,12 @@ function Items({ look, onLookAgain }: ItemsProps) {
 interface RemediesProps {
   entry: QueueEntry;
   look: QueueLook;
+  /** The look is another one than its person asked for. */
+  changed: boolean;
 }
 
 /** A second person's yes to an entry, and a confirmation of its starter, where they are asked for. */
-function Remedies({ entry, look }: RemediesProps) {
+function Remedies({ entry, look, changed }: RemediesProps) {
   const versions = useVersions(entry.graph ?? "", entry.version).data;
   const items = look.looks.flatMap(({ items: each }) => each);
   // While a check that somebody could override is in the way, this start is not the one that will be sent.
@@ -105,6 +107,7 @@ function Remedies({ entry, look }: RemediesProps) {
           looks={look.looks}
           values={entry.values}
           taken={null}
+          changed={changed}
         />
       )}
       <ConfirmFirst looks={look.looks} />
@@ -198,7 +201,7 @@ export function Turn({ entry }: { entry: QueueEntry }) {
         </div>
       )}
       {found && <Items look={found} onLookAgain={() => void look.refetch()} />}
-      {found && <Remedies entry={entry} look={found} />}
+      {found && <Remedies entry={entry} look={found} changed={found.look !== seen} />}
       {found && <WatchTicks watch={watch} />}
       <div className={style.buttons}>
         <Button

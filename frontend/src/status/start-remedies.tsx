@@ -28,6 +28,8 @@ interface SecondPersonProps {
   values: StartValues;
   /** The question whose values these are. */
   taken: ApprovalWanted | null;
+  /** Set while the start is another one than its person has looked at: nobody says yes to that unseen. */
+  changed?: boolean;
 }
 
 /** Return the robots that ask this person to confirm who they are. */
@@ -96,7 +98,8 @@ function Said({ given, me, label }: { given: readonly Approval[]; me: string; la
   );
 }
 
-export function SecondPerson({ graph, label, looks, values, taken }: SecondPersonProps) {
+export function SecondPerson(props: SecondPersonProps) {
+  const { graph, label, looks, values, taken, changed = false } = props;
   const { runner = "" } = useLive();
   const { person } = usePerson();
   const may = useMay("operate");
@@ -135,9 +138,15 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
             : ": the graph, its robots, where it begins, or what is started in spite of a check differ."}
         </Text>
       )}
+      {changed && (
+        <Text size="sm" c="var(--warn)" role="status">
+          Something has changed: look again before you say yes.
+        </Text>
+      )}
       {may && !mine && (
         <Button
           size="compact-sm"
+          disabled={changed}
           loading={say.isPending}
           leftSection={<IconUserCheck size={14} aria-hidden />}
           onClick={() => say.mutate()}
@@ -150,7 +159,7 @@ export function SecondPerson({ graph, label, looks, values, taken }: SecondPerso
           size="compact-sm"
           variant="default"
           loading={ask.isPending}
-          disabled={ask.isSuccess}
+          disabled={changed || ask.isSuccess}
           leftSection={<IconSend size={14} aria-hidden />}
           onClick={() => ask.mutate()}
         >

@@ -102,7 +102,10 @@ test("a press of the same that is sent again is one unanswered start, until it i
   await expect(sendNoted(sent, lost)).rejects.toBeInstanceOf(Unanswered);
   expect(unansweredStarts.now().map(({ request }) => request)).toEqual(["q"]);
   await expect(sendNoted(sent, () => Promise.reject(refusal))).rejects.toBe(refusal);
-  expect(unansweredStarts.now()).toEqual([]);
+  // The first one may still be carried out.
+  expect(unansweredStarts.now().map(({ request }) => request)).toEqual(["q"]);
   expect(await sendNoted(sent, () => Promise.resolve("there"))).toBe("there");
+  expect(unansweredStarts.now()).toEqual([]);
+  await expect(sendNoted(sent, () => Promise.reject(refusal))).rejects.toBe(refusal);
   expect(unansweredStarts.now()).toEqual([]);
 });

@@ -219,13 +219,14 @@ export class Unanswered extends Error {}
 
 /**
  * Send a start, or one for the queue. Where nobody says what became of it, the page looks for it from then on,
- * and the promise rejects with `Unanswered`.
+ * and the promise rejects with `Unanswered`. Another press that is refused settles no earlier one in doubt.
  */
 export async function sendNoted<T>(
   start: Omit<SentStart, "at">,
   send: () => Promise<T>,
 ): Promise<T> {
   const { request } = start;
+  const wasInDoubt = unansweredStarts.now().some((each) => each.request === request);
   unansweredStarts.sends({ ...start, at: serverNow() });
   try {
     const answer = await send();
@@ -236,7 +237,8 @@ export async function sendNoted<T>(
       unansweredStarts.doubt(request);
       throw new Unanswered(errorText(error));
     }
-    unansweredStarts.settle(request);
+    if (wasInDoubt) unansweredStarts.doubt(request);
+    else unansweredStarts.settle(request);
     throw error;
   }
 }

@@ -45,7 +45,7 @@ import {
   WayChoice,
 } from "./led-choice";
 import { PreflightList } from "./preflight-list";
-import { QueueOffer } from "./queue-choice";
+import { mayWait, QueueOffer } from "./queue-choice";
 import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
 import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";
@@ -573,7 +573,7 @@ export function StartDialog(props: Props) {
         taken={given.taken}
       />
       <ConfirmFirst looks={looks} />
-      {codes.length > 0 && !looks?.some(({ never }) => never) && (
+      {codes.length > 0 && (mayWait(looks) || !looks?.some(({ never }) => never)) && (
         <Textarea
           label="Why start anyway? It is recorded with the run."
           value={reason}
