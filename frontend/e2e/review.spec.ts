@@ -93,36 +93,6 @@ test("a replay shows each moment as it was known then, by mouse and by keyboard"
     .toHaveLength(1);
 });
 
-test("a part of the time is looked at more closely, and a link carries it", async ({ browser }) => {
-  const long = await ran({ "*": [{ after_s: 1.2 }] });
-  const { page } = ada;
-  await page.goto(`${product.url}/runs/${long.id}`);
-  const timeline = page.getByRole("region", { name: "Timeline" });
-  const bars = timeline.locator("[data-track] i[data-tone]");
-  await expect(bars).toHaveCount(3);
-  await page.getByRole("slider", { name: "Moment of the run" }).press("Home");
-  await timeline.getByRole("button", { name: "Zoom into the time" }).click();
-  await expect(bars).toHaveCount(2); // the third began later
-  await timeline.getByRole("button", { name: "Zoom into the time" }).click();
-  await expect(bars).toHaveCount(1);
-  await expect(timeline.getByText("0.2 s")).toBeVisible();
-  await expect.poll(() => new URL(page.url()).searchParams.get("until")).not.toBeNull();
-  const shared = page.url();
-  await page.getByRole("slider", { name: "Moment of the run" }).press("End");
-  const next = page.getByRole("button", { name: "The change before" });
-  for (let i = 0; i < 3; i += 1) await next.click();
-  await expect(timeline.getByText("0.2 s")).toBeHidden(); // the part goes where the replay is
-  await page.goto(shared);
-  await expect(bars).toHaveCount(1);
-  await timeline.getByRole("button", { name: "All", exact: true }).click();
-  await expect(bars).toHaveCount(3);
-  const phone = await product.person(browser, "Mari", { viewport: { width: 360, height: 740 } });
-  await phone.page.goto(shared);
-  await phone.page.getByRole("button", { name: "Zoom out of the time" }).click();
-  await expect(phone.page.locator("[data-track] i[data-tone]")).toHaveCount(2);
-  await phone.context.close();
-});
-
 test("what the page showed live is what the replay shows of that moment", async () => {
   const { page } = ada;
   const { id, digest, umrf } = await version(graph);
@@ -344,7 +314,7 @@ test("the list is walked by keys, and the run before is one click away", async (
   await page.goto(`${product.url}/runs/compare?b=${bad.id}`);
   await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
   await page.getByRole("link", { name: "Another run" }).click();
-  await expect(page.getByText("Compare with which run?")).toBeVisible();
+  await expect(page.getByText("Which run do you want to compare with?")).toBeVisible();
 });
 
 test("the rarer filters narrow the list, and what was stored can be read as it is", async () => {
@@ -379,4 +349,34 @@ test("statistics tell how often it succeeds and which action fails", async () =>
   await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
   await expect(page.getByRole("row", { name: /Wait_1/ })).toBeVisible();
   await expect(page.getByText(/Wait_1.*visits|1 of \d+ visits/).first()).toBeVisible();
+});
+
+test("a part of the time is looked at more closely, and a link carries it", async ({ browser }) => {
+  const long = await ran({ "*": [{ after_s: 1.2 }] }, await product.chain(3));
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${long.id}`);
+  const timeline = page.getByRole("region", { name: "Timeline" });
+  const bars = timeline.locator("[data-track] i[data-tone]");
+  await expect(bars).toHaveCount(3);
+  await page.getByRole("slider", { name: "Moment of the run" }).press("Home");
+  await timeline.getByRole("button", { name: "Zoom into the time" }).click();
+  await expect(bars).toHaveCount(2); // the third began later
+  await timeline.getByRole("button", { name: "Zoom into the time" }).click();
+  await expect(bars).toHaveCount(1);
+  await expect(timeline.getByText("0.2 s")).toBeVisible();
+  await expect.poll(() => new URL(page.url()).searchParams.get("until")).not.toBeNull();
+  const shared = page.url();
+  await page.getByRole("slider", { name: "Moment of the run" }).press("End");
+  const next = page.getByRole("button", { name: "The change before" });
+  for (let i = 0; i < 3; i += 1) await next.click();
+  await expect(timeline.getByText("0.2 s")).toBeHidden(); // the part goes where the replay is
+  await page.goto(shared);
+  await expect(bars).toHaveCount(1);
+  await timeline.getByRole("button", { name: "All", exact: true }).click();
+  await expect(bars).toHaveCount(3);
+  const phone = await product.person(browser, "Mari", { viewport: { width: 360, height: 740 } });
+  await phone.page.goto(shared);
+  await phone.page.getByRole("button", { name: "Zoom out of the time" }).click();
+  await expect(phone.page.locator("[data-track] i[data-tone]")).toHaveCount(2);
+  await phone.context.close();
 });

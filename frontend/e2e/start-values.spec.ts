@@ -207,7 +207,9 @@ test("a second person takes over the values for which one asks, and says yes to 
   await valve(ada.page).fill("valve_9");
   await expect(look(ada.page)).toContainText("exactly this start", { timeout: 30_000 });
   await dialog(ada.page).getByRole("button", { name: "Ask others for their yes" }).click();
-  await expect(dialog(ada.page)).toContainText("They see it where they start the graph.");
+  await expect(dialog(ada.page)).toContainText(
+    "They see it where they start the graph, or in the queue.",
+  );
   await open(ben.page);
   await values(ben.page).getByRole("button", { name: "Take these values" }).click();
   await expect(valve(ben.page)).toHaveValue("valve_9");

@@ -39,13 +39,13 @@ async def test_what_a_start_for_the_queue_has_become_is_known_by_its_request_id(
     async with lab.runner() as (_, queues):
         request = on("David")
         id_ = request.start.request_id
-        assert (queues.is_entering(id_), await queues.queued(id_)) == (False, None)
+        assert (queues.is_under_way(id_), await queues.queued(id_)) == (False, None)
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(put, queues, request)
             await anyio.lowlevel.checkpoint()
-            assert queues.is_entering(id_)
+            assert queues.is_under_way(id_)
         entry = queues.entries[0]
-        assert (queues.is_entering(id_), await queues.queued(id_)) == (
+        assert (queues.is_under_way(id_), await queues.queued(id_)) == (
             False,
             QueuedStart(entry.id, True),
         )

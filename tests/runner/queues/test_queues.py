@@ -394,9 +394,9 @@ async def test_a_start_of_an_entry_is_under_way_while_the_runner_looks() -> None
     lab = Lab()
     async with lab.runner() as (_, queues):
         entry = await put(queues, on("David"))
-        assert not queues.is_starting(request_of(entry.id))
+        assert not queues.is_under_way(request_of(entry.id))
         async with entry.turn:
-            assert queues.is_starting(request_of(entry.id))
+            assert queues.is_under_way(request_of(entry.id))
 
 
 @virtual

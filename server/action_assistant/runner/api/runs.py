@@ -172,11 +172,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         request_id = request_id.removeprefix("/")
         queues, history = services.queues, services.control.history
         # Before the query: a start that is not under way any more is stored.
-        under_way = (
-            services.control.under_way(request_id)
-            or queues.is_entering(request_id)
-            or queues.is_starting(request_id)
-        )
+        under_way = services.control.under_way(request_id) or queues.is_under_way(request_id)
         queued = await queues.queued(request_id)
         rows = list(await history.rows(queries.of_start(request_id)))
         if queued is not None:

@@ -157,15 +157,11 @@ class Queues:
             raise NotFound("This is not in the queue: it has left it, or never was.")
         return found
 
-    def is_entering(self, request_id: str) -> bool:
-        """Return whether the start with this request id is being put into the queue at this moment."""
-        return self._putting[request_id] > 0
-
-    def is_starting(self, request_id: str) -> bool:
-        """Return whether the start of an entry, with this request id, is looked at or sent at this moment."""
-        return any(
-            request_of(each.id) == request_id and each.turn.locked() for each in self._entries
-        )
+    def is_under_way(self, request_id: str) -> bool:
+        """Return whether the start with this request id is being put into the queue, or is looked at
+        or sent as that of an entry, at this moment."""
+        starting = (request_of(each.id) for each in self._entries if each.turn.locked())
+        return self._putting[request_id] > 0 or request_id in starting
 
     async def queued(self, request_id: str) -> QueuedStart | None:
         """Return the entry that the start with this request id has become; None if it has become none.
@@ -190,8 +186,8 @@ class Queues:
         rules = {name: self._control.rights.of(name).rules for name in engines_of(start)}
         now = looked_of(looks, rules)
         differs = differences(seen, now, looks)
-        digest = digest_of(now, looks, ready_at)
-        return Look(tuple(looks), differs, digest, overridden_in(start)), now
+        look = Look(tuple(looks), differs, digest_of(now, looks, ready_at), overridden_in(start))
+        return look, now
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
         """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
@@ -463,10 +459,8 @@ class Queues:
                     raise Forbidden(denied.reason)
                 await self._start(entry, start, ready_at, author, identity)
             except Refused as refused:
-                for queue in [
-                    self._queues[name] for name in entry.queue_names if name in self._queues
-                ]:
-                    self._doubts.meet(queue, Doubt("refused", refused.detail))
+                for name in self._queues.keys() & set(entry.queue_names):
+                    self._doubts.meet(self._queues[name], Doubt("refused", refused.detail))
 
     # --- start --------------------------------------------------------------------------------
 
@@ -514,9 +508,8 @@ class Queues:
                 text = f"The queue of {named(each.robot)} is closed. {told(closed)}"
                 raise Conflict(text, where=where | {"closing": closing_of(closed)})
             if each.why == "behind":
-                raise Conflict(
-                    f"{each.behind} before it wait for {named(each.robot)}.", where=where
-                )
+                text = f"{each.behind} before it wait for {named(each.robot)}."
+                raise Conflict(text, where=where)
             text = named(each.robot)
             raise Conflict(f"{text[0].upper()}{text[1:]} is not free.", where=where)
         assert entry.ready_at is not None
