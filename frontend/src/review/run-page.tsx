@@ -94,7 +94,9 @@ function rangeAsked(run: Run, search: string): TimeRange | null {
 /** The part of the time that is shown: it goes on like pages with the replay. */
 function useTimeRange(run: Run, { at }: ReplayCursor, search: string) {
   const [range, setRange] = useState(() => rangeAsked(run, search));
-  const shown = range === null || at === null ? range : turnedTo(range, at);
+  // A replay begins with the request, before anything that the timeline shows.
+  const moment = at === null ? null : Math.max(at, originOf(run));
+  const shown = range === null || moment === null ? range : turnedTo(range, moment);
   if (shown !== range) setRange(shown);
   return [shown, setRange] as const;
 }

@@ -183,11 +183,11 @@ class Queues:
         self, start: StartRequest, seen: Looked, identity: Identity, ready_at: int | None = None
     ) -> tuple[Look, Looked]:
         looks = await self._control.look(group_of(start), identity.person.id, identity)
-        rules = {name: self._control.rights.of(name).rules for name in engines_of(start)}
-        now = looked_of(looks, rules)
+        of = self._control.rights.of
+        now = looked_of(looks, {name: of(name).rules for name in engines_of(start)})
         differs = differences(seen, now, looks)
-        look = Look(tuple(looks), differs, digest_of(now, looks, ready_at), overridden_in(start))
-        return look, now
+        digest = digest_of(now, looks, ready_at)
+        return Look(tuple(looks), differs, digest, overridden_in(start)), now
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
         """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
@@ -544,11 +544,10 @@ class Queues:
     def _queue_of(self, name: str) -> RobotQueue:
         """Return the queue of a robot. One in which nothing waited is open: whoever puts the first start
         into it has looked."""
-        queue = self._queues.get(name)
-        if queue is None:
-            queue = self._queues[name] = RobotQueue(name, self._robots_of)
-            self._doubts.begin(queue)
-        return queue
+        if name not in self._queues:
+            self._queues[name] = RobotQueue(name, self._robots_of)
+            self._doubts.begin(self._queues[name])
+        return self._queues[name]
 
     def _drop_empty(self) -> None:
         used = {name for each in self._entries for name in each.queue_names}
