@@ -22,7 +22,6 @@ from action_assistant.runner.queues.entry import (
     QueueReady,
     QueueRequest,
     TurnRequest,
-    request_of,
     stream_of,
 )
 from action_assistant.runner.queues.robot_queue import Entry, RobotQueue
@@ -372,46 +371,6 @@ async def test_a_start_that_was_pressed_before_a_stop_does_not_leave_when_the_qu
         assert found == ["Its queue was closed since, or a robot was not free. Look again."]
         await anyio.sleep(60)
         assert lab.david.starts == []
-
-
-@virtual
-async def test_a_look_from_before_a_stop_starts_nothing_when_the_queue_is_open_again() -> None:
-    lab = Lab()
-    async with lab.runner() as (control, queues):
-        entry = await put(queues, on("David"))
-        look = await queues.look(entry.id, {}, ANN)
-        control.stop_robot("David", author(BEN))
-        await reopened(queues, "David")
-        with pytest.raises(Conflict, match="Look again"):
-            await queues.start(entry.id, TurnRequest(look.digest), author(ANN), ANN)
-        assert lab.david.starts == []
-        await started(queues, entry)
-        assert len(lab.david.starts) == 1
-
-
-@virtual
-async def test_a_start_of_an_entry_is_under_way_while_the_runner_looks() -> None:
-    lab = Lab()
-    async with lab.runner() as (_, queues):
-        entry = await put(queues, on("David"))
-        assert not queues.is_under_way(request_of(entry.id))
-        async with entry.turn:
-            assert queues.is_under_way(request_of(entry.id))
-
-
-@virtual
-async def test_a_refusal_of_a_closed_queue_quotes_no_run_and_no_refused_start() -> None:
-    lab = Lab()
-    async with lab.runner() as (_, queues):
-        entry = await put(queues, on("David"))
-        for doubt in (Doubt("refused", "Pick secret."), Doubt("lost", "Pick secret.", run="r")):
-            queues._doubts.meet(queue_of(queues, "David"), doubt)
-            asked = OpenQueueRequest("another")
-            for press in (queues.open("David", asked, author(BEN), BEN), started(queues, entry)):
-                with pytest.raises(Conflict) as refused:
-                    await press
-                assert "secret" not in refused.value.detail
-            await reopened(queues, "David")
 
 
 @virtual
