@@ -7,7 +7,6 @@ import {
   IconPackage,
   IconPhoto,
   IconPrinter,
-  IconVectorTriangle,
 } from "@tabler/icons-react";
 import { copyLinkTo } from "./clipboard";
 import type { EditAction } from "./edit-action";
@@ -31,7 +30,7 @@ export const exportSvg: EditAction = {
   name: "export-svg",
   label: "Export as SVG",
   shortcuts: [],
-  icon: IconVectorTriangle,
+  icon: IconPhoto,
   also: "picture image download vector",
   run: (context) => context.download("svg"),
 };

@@ -105,3 +105,17 @@ def test_a_script_is_sent_in_the_shortest_form_that_the_browser_reads(
     assert headers["vary"] == "accept-encoding"
     assert "immutable" in headers["cache-control"]
     assert not page.knows("/assets/index-abc.js.br", accepts_html=False)
+
+
+def test_styles_and_fonts_have_a_policy_of_their_own_by_which_they_load_nothing(
+    page: Page, tmp_path: Path
+) -> None:
+    for name in ("page-abc.css", "inter-abc.woff2"):
+        (tmp_path / "assets" / name).write_text("x")
+    (tmp_path / "index.html").touch()
+    shown = Page(_nobody, tmp_path)
+    for name in ("page-abc.css", "inter-abc.woff2"):
+        policy = asked(shown, f"/assets/{name}")[1]["content-security-policy"]
+        assert policy == "default-src 'none'; frame-ancestors 'none'"
+    # A script may be that of a worker, to which its policy applies: it has that of the page.
+    assert "content-security-policy" not in asked(shown, "/assets/index-abc.js")[1]

@@ -41,6 +41,9 @@ _POLICY: Final = (
     "frame-ancestors 'none'"
 )
 _FIELDS: Final = ((b"content-security-policy", _POLICY.encode()),)
+#: Files that load and run nothing, and the policy for them: that of the page has 300 bytes.
+_INERT: Final = frozenset({".css", ".woff2"})
+_NOTHING: Final = ((b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),)
 _HELP_UNBUILT: Final = (
     "The documentation is not part of this installation. In the folder of the source code, "
     "<code>make site</code> builds it; its texts are in the folder <code>docs</code> there."
@@ -58,6 +61,7 @@ class File:
         self.body: Final = body
         self.etag: Final = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
         self.lasting: Final = lasting
+        self.fields: Final[Fields] = _NOTHING if suffix in _INERT else ()
         self.brotli: Final = brotli
         pays = suffix in _COMPRESSED and len(body) > _WORTH
         self._zipped: bytes | None = None if pays else b""
@@ -93,13 +97,13 @@ async def send_file(
     scope: HTTPScope, send: Send, file: File, status: int = 200, more: Fields = ()
 ) -> None:
     """Answer with a file, compressed if the client accepts that, or with 304 if the client has it
-    already. `more` are additional headers."""
+    already. `more` are additional headers, in place of those of the file."""
     asked = dict(scope["headers"])
     fields = [
         (b"etag", file.etag.encode()),
         (b"cache-control", b"max-age=31536000, immutable" if file.lasting else b"no-cache"),
         (b"vary", b"accept-encoding"),
-        *more,
+        *(more or file.fields),
     ]
     body = file.body
     if status == 200 and asked.get(b"if-none-match") == file.etag.encode():
