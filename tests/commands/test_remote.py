@@ -247,6 +247,26 @@ def test_a_led_run_takes_the_breakpoints_of_its_graph_where_the_command_says_so(
         product.cli("stop", run)
 
 
+def test_a_led_run_opens_no_sub_graph_whose_breakpoints_it_would_not_keep(product: Product) -> None:
+    outer = {
+        "graph_name": "around",
+        "graph_entry": [{"name": "marked"}],
+        "graph_exit": [{"name": "marked"}],
+        "actions": [{"name": "marked", "type": "sync"}],
+    }
+    with product.editor() as editor:
+        inner = editor.post("/api/graphs", json={**GRAPH, "graph_name": "marked"}).json()["id"]
+        graph = editor.post("/api/graphs", json=outer).json()["id"]
+    anyio.run(wait_at, product, inner, "B", '{"by": "ada"}')
+    started = ("run", graph, "--robots", "=simulator", "--into", "--no-wait")
+    refused = product.cli(*started, "--breakpoints")
+    assert refused.returncode == 2
+    assert "marked has breakpoints inside, which do not hold with --into" in refused.stderr
+    with product.runner() as runner:
+        assert runner.get("/api/runs", params={"graph": graph}).json() == []
+    assert product.cli(*started).returncode == 0
+
+
 async def until(true: Callable[[], bool]) -> None:
     """Wait for something that must happen."""
     with anyio.fail_after(20):

@@ -28,36 +28,6 @@ export async function fetchInside(
   return insideOf(await editor.get("/api/graphs/{graph_id}/subgraphs", request));
 }
 
-/** Fetch the names of the graphs inside of a moment, as they are now, that have breakpoints of their own. */
-async function fetchMarkedInside(
-  graph: string,
-  seq: number,
-  signal: AbortSignal,
-): Promise<string[]> {
-  const request = { path: inGraph(graph), query: { at: seq }, signal };
-  const { subgraphs } = await editor.get("/api/graphs/{graph_id}/subgraphs", request);
-  const marks = await Promise.all(
-    subgraphs.map((each) =>
-      editor.get("/api/graphs/{graph_id}/breakpoints", { path: inGraph(each.graph), signal }),
-    ),
-  );
-  return subgraphs.filter((_, i) => (marks[i]?.length ?? 0) > 0).map(({ name }) => name);
-}
-
-const AGAIN = 5_000; // ms
-
-/** Query which graphs inside of a moment have breakpoints: a start that opens them takes none of these. */
-export function useMarkedInside(graph: string, seq: number, enabled: boolean) {
-  return useQuery({
-    queryKey: ["breakpoints inside", graph, seq],
-    queryFn: ({ signal }) => fetchMarkedInside(graph, seq, signal),
-    enabled,
-    refetchInterval: AGAIN,
-    staleTime: 0,
-    gcTime: 0,
-  });
-}
-
 /** Gives the actions that stand for a graph in these others its new name. Answers where there were some. */
 export function callUses(
   graph: string,

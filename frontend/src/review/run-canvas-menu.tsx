@@ -5,6 +5,7 @@ import { IconPlayerSkipForward } from "@tabler/icons-react";
 import { useVersions } from "../api/graphs";
 import type { Run } from "../api/runs";
 import { fullName, type Graph, type Position } from "../graph/model";
+import { isOpened } from "../status/earlier-list";
 import { spaced } from "../status/level-places";
 import { RunPoint } from "../status/run-point";
 import { keyOf } from "../ui/keys";
@@ -28,9 +29,6 @@ interface Props {
   onStart: (again: RepeatActions) => void;
   onClose: () => void;
 }
-
-/** Return whether the actions inside of sub-graphs were steps of their own: the version has none of these. */
-const isOpened = (run: Run) => Object.values(run.actions ?? {}).some(({ levels }) => levels);
 
 /** Return whether there is something to do at a place of a run. */
 export function hasRunMenu(run: Run, graph: Graph, id: string): boolean {

@@ -419,10 +419,17 @@ def _breakpoints(
     server: Server, version: dict[str, Any], options: argparse.Namespace
 ) -> list[dict[str, Any]]:
     """Return where a run of a version waits: as the command says, and, if it says so, at the breakpoints
-    of the graph. Of two before one action that of the command counts."""
+    of the graph. Of two before one action that of the command counts. Raise CannotStart if the run opens
+    sub-graphs that have breakpoints of their own, which it would not keep."""
     chosen: list[dict[str, Any]] = options.breaks
     if not options.breakpoints:
         return chosen
+    for each in version.get("subgraphs", ()) if options.into else ():
+        if server.editor("GET", f"/api/graphs/{each['graph']}/breakpoints").json():
+            raise CannotStart(
+                f"{each['name']} has breakpoints inside, which do not hold with --into: remove them, or "
+                "leave --into out."
+            )
     path = f"/api/graphs/{version['graph']}/breakpoints"
     kept = server.editor("GET", path, params={"at": version["seq"]}).json()
     said = {each["action"] for each in chosen}

@@ -8,7 +8,7 @@ import { CONDUCTED } from "../../api/led-runs";
 import { useMay } from "../../api/people";
 import { SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
-import { canContinue } from "../../status/earlier-list";
+import { canContinue, isOpened } from "../../status/earlier-list";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { nextLabel, notifyFailure } from "./use-start";
 
@@ -100,7 +100,13 @@ export function ContinueButton({ run }: { run: Run }) {
             chosen={[CONDUCTED]}
             robots={run.robots}
             values={run.values}
-            beginning={{ run: run.id, number: run.number, at: [], only: false }}
+            beginning={{
+              run: run.id,
+              number: run.number,
+              at: [],
+              only: false,
+              opened: isOpened(run),
+            }}
             onChosen={() => undefined}
             onClose={() => setAsking(false)}
           />

@@ -62,6 +62,8 @@ test("breakpoints inside of sub-graphs keep these from being opened until they a
   expect(marksObstacle(["Pick"])).toBe("There are breakpoints inside");
   expect(marksObstacle([])).toBeNull();
   expect(marksInsideWords(["Pick", "Place"])).toMatch(/^Breakpoints inside of .*Pick.*, .*Place/);
+  expect(marksInsideWords(["Pick"])).toContain("or start with");
+  expect(marksInsideWords(["Pick"], true)).toMatch(/opened: remove them\.$/); // a run is continued as it was led
 });
 
 test("levels that double are read once for each actor, and a graph inside of itself is no circle", () => {

@@ -7,7 +7,7 @@ import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
 import { fetchDocument } from "../../api/history";
 import { errorText } from "../../api/http";
-import { fetchInside, useMarkedInside } from "../../api/inside";
+import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay, usePerson } from "../../api/people";
@@ -39,9 +39,11 @@ import {
   castOf,
   LedChoice,
   LevelsChoice,
+  marksInsideWords,
   marksObstacle,
   movesWords,
   PeopleChoice,
+  useMarkedInside,
   WayChoice,
 } from "./led-choice";
 import { PreflightList } from "./preflight-list";
@@ -325,8 +327,9 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const [opens, setOpens] = useState(before?.levels === "opened");
   const mayOpen = led && beginning === undefined && (graphs?.length ?? 0) > 0;
   const opened = mayOpen && opens;
-  const marked = useMarkedInside(graph, seq, opened);
-  const unheld = opened ? marksObstacle(marked.data) : null;
+  const isInside = opened || beginning?.opened === true;
+  const marked = useMarkedInside(graph, seq, isInside);
+  const unheld = isInside ? marksObstacle(marked.data) : null;
   const roles = useMemo(
     () => rolesIn(opened ? [...own, ...actionsInside(graphs)] : own),
     [own, opened, graphs],
@@ -507,6 +510,11 @@ export function StartDialog(props: Props) {
             way.setOpens(opened);
           }}
         />
+      )}
+      {!way.mayOpen && (way.marked.data?.length ?? 0) > 0 && (
+        <Text size="sm" className="ink-warn" role="alert">
+          {marksInsideWords(way.marked.data ?? [], true)}
+        </Text>
       )}
       {way.roles.length > 0 && (
         <PeopleChoice roles={way.roles} people={way.people} onPeople={way.setAnswering} />
