@@ -33,7 +33,7 @@ _BEGINS: Final = frozenset({"run.play_began.v1", "run.piece_began.v1"})
 
 
 class Found(NamedTuple):
-    """What presses of one kind found. `closed`: from the moment before a press was sent until the gate was
+    """Times of presses of one kind. `closed`: from the moment before a press was sent until the gate was
     closed, in ms; `last`: until the last action began after that moment, 0 for none; `after`: actions that
     began although the gate was closed."""
 

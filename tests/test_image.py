@@ -173,7 +173,7 @@ print(json.dumps([files, sorted({each for top in tops for each in packages.get(t
 
 
 def test_the_help_needs_nothing_that_its_stage_does_not_have(tmp_path: Path) -> None:
-    """It is made of some files of the program and of the packages in requirements/site.txt."""
+    """The build of the help imports some files of the program, and packages of requirements/site.txt."""
     pytest.importorskip("sphinx")
     for words in stages()["help"]:
         for source in words[1:-1] if words[0] == "COPY" else ():

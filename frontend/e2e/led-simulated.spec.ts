@@ -128,9 +128,9 @@ test("a run asks people, on every page, and their first answer is its outcome", 
   await expect(answers).toContainText(/Choose 0: right, by .?Ada/);
 });
 
-test("on the canvas of a run people let it wait at an action and an arrow, and go on until one", async () => {
-  const { page } = ada;
-  await page.goto(`${product.url}/graphs/${await line("belt", 5)}`);
+/** Leads a graph in the simulator until it waits at a breakpoint before its action *Grip*. */
+async function waitsAtGrip(page: Page, graph: string): Promise<void> {
+  await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
   await card(page, "Grip").click({ position: { x: 40, y: 24 } });
   await page.keyboard.press("F9");
@@ -140,6 +140,11 @@ test("on the canvas of a run people let it wait at an action and an arrow, and g
   await expect(start).toBeEnabled({ timeout: 15_000 });
   await holdEnter(page, start);
   await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });
+}
+
+test("on the canvas of a run people let it wait at an action and an arrow, and go on until one", async () => {
+  const { page } = ada;
+  await waitsAtGrip(page, await line("belt", 5));
   const at = (place: string) =>
     page.getByRole("region", { name: new RegExp(`^${place} in run`) }).filter({ visible: true });
 
@@ -258,16 +263,7 @@ test("a dry-run begins at an action, or plays nothing else", async () => {
 
 test("the canvas of a run has a menu by keys, mouse and finger: wait, go on until here, run from here", async () => {
   const { page } = ada;
-  await page.goto(`${product.url}/graphs/${await line("menu", 4)}`);
-  await saved(page);
-  await card(page, "Grip").click({ position: { x: 40, y: 24 } });
-  await page.keyboard.press("F9");
-  await saved(page);
-  await page.getByRole("button", { name: "Choose where to start" }).click();
-  const start = dialog(page).getByRole("button", { name: /^Run v\d+, step by step, in/ });
-  await expect(start).toBeEnabled({ timeout: 15_000 });
-  await holdEnter(page, start);
-  await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });
+  await waitsAtGrip(page, await line("menu", 4));
   const [run] = await runs();
   await page.goto(`${product.url}/runs/${run?.id}`);
   const menu = page.getByRole("dialog", { name: "What can be done here" });

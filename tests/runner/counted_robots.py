@@ -15,7 +15,7 @@ from runner.harness import Robot, clock_us
 
 
 class Begins:
-    """What the actions of all robots count themselves: how often each has begun in each run, and when."""
+    """The count that actions keep themselves: how often each has begun in each run of any robot, and when."""
 
     def __init__(self) -> None:
         self.times: dict[tuple[str, str], list[float]] = {}

@@ -1,4 +1,4 @@
-"""What an entry of the queue asks of people at its turn, and what is known of one whose answer was lost."""
+"""An entry of the queue asks people for what its start lacks, and one whose answer was lost can be found."""
 
 import anyio
 import anyio.lowlevel

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from random import Random
 
+import msgspec
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -48,7 +49,7 @@ def task(inside: int = 2) -> OpenedGraph:
 
 
 def translated(found: OpenedGraph, **place: object) -> list[tuple[str, str, tuple[Told, ...]]]:
-    each = Breakpoint(**place)  # type: ignore[arg-type]
+    each = msgspec.convert(place, Breakpoint)
     return [(one.action, one.to, one.outcomes) for one in opened_breakpoints(found, [each])]
 
 
@@ -143,7 +144,7 @@ def test_what_is_not_known_to_do_the_same_is_not_opened() -> None:
 def waits(
     own: Mapping[str, list[tuple[float, str]]], breakpoints: Iterable[Breakpoint]
 ) -> set[float]:
-    """When a run with this course would wait, for breakpoints without values."""
+    """Return when a run with this course would wait at breakpoints without values."""
     found = set[float]()
     for each in breakpoints:
         visit, runs = 0, False
