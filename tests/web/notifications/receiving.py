@@ -17,6 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aiosmtpd.controller import Controller
+from aiosmtpd.smtp import AuthResult, LoginPassword
 from standardwebhooks import Webhook as StandardWebhook
 
 from action_assistant.web.network.certificate import Certificate
@@ -85,12 +86,16 @@ def http_receiver(context: ssl.SSLContext | None = None) -> Iterator[HttpReceive
 
 class Mails:
     """The mails that a mail server has got. `refuses`: the answer to each mail instead; `unknown`:
-    addresses that it refuses; `got`, `refused`: how often each address got or was refused a mail."""
+    addresses that it refuses; `got`, `refused`: how often each address got or was refused a mail;
+    `signed_in`: by which mechanism a password came, and whether it was right; `no_check`: the answer to
+    each password instead."""
 
     def __init__(self) -> None:
         self.raw: list[bytes] = []
         self.refuses = ""
         self.unknown: set[str] = set()
+        self.no_check = ""
+        self.signed_in: list[tuple[str, bool]] = []
         self.got: Counter[str] = Counter()
         self.refused: Counter[str] = Counter()
 
@@ -120,10 +125,30 @@ class Mails:
 
 
 @contextmanager
-def mail_server(context: ssl.SSLContext | None = None) -> Iterator[tuple[Mails, int]]:
+def mail_server(
+    context: ssl.SSLContext | None = None,
+    *,
+    passwords: Mapping[str, str] | None = None,
+    implicit: bool = False,
+) -> Iterator[tuple[Mails, int]]:
     """Return a context with the mails of a server and its port; with a TLS context it demands
-    STARTTLS."""
+    STARTTLS, or if `implicit` speaks TLS from the first byte. It takes mail from these users only."""
     mails = Mails()
+    known = {each.encode(): word.encode() for each, word in (passwords or {}).items()}
+
+    def check(
+        _server: Any, _session: Any, _envelope: Any, mechanism: str, given: LoginPassword
+    ) -> AuthResult:
+        fits = known.get(given.login) == given.password
+        mails.signed_in.append((mechanism, fits))
+        success = fits and not mails.no_check
+        return AuthResult(success=success, handled=False, message=mails.no_check or None)
+
+    secured: dict[str, Any] = {"tls_context": context, "require_starttls": context is not None}
+    if implicit:
+        secured = {"ssl_context": context, "auth_require_tls": False}
+    if passwords:
+        secured |= {"auth_required": True, "authenticator": check}
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -131,8 +156,7 @@ def mail_server(context: ssl.SSLContext | None = None) -> Iterator[tuple[Mails, 
         mails,
         hostname="127.0.0.1",
         port=port,
-        tls_context=context,
-        require_starttls=context is not None,
+        **secured,
     )
     controller.start()
     try:

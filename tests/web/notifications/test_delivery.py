@@ -151,6 +151,36 @@ def test_a_mail_server_that_does_not_encrypt_gets_nothing() -> None:
     assert len(mails.raw) == 1
 
 
+# The server does not see that its socket is encrypted from the first byte.
+@pytest.mark.filterwarnings("ignore:Requiring AUTH while not requiring TLS:UserWarning")
+@pytest.mark.parametrize("implicit", [False, True])
+@pytest.mark.parametrize("password", ["s3cret word", "schlüssel-€"])
+def test_a_mail_server_gets_user_and_password_encrypted_alone(
+    tmp_path: Path, password: str, implicit: bool
+) -> None:
+    context, ca = tls(tmp_path, "localhost")
+    known = {"security": "tls" if implicit else "starttls", "ca": ca, "user": "robots"}
+    with mail_server(context, passwords={"robots": password}, implicit=implicit) as (mails, port):
+        deliver(mailbox(port, **known, password=password), failed_run(), "")
+        assert mails.signed_in == [("PLAIN", True)]
+        with pytest.raises(NotDelivered, match=r"does not take the user or the password \(535\)"):
+            deliver(mailbox(port, **known, password=password + "?"), failed_run(), "")
+        mails.no_check = "454 4.7.0 Temporary authentication failure"
+        with pytest.raises(NotDelivered, match=r"cannot check the password now \(454\)"):
+            deliver(mailbox(port, **known, password=password), failed_run(), "")
+        with pytest.raises(NotDelivered, match="certificate is not trusted"):
+            deliver(mailbox(port, **(known | {"ca": None}), password=password), failed_run(), "")
+        with pytest.raises(NotDelivered, match="It answered 530"):
+            deliver(mailbox(port, **(known | {"user": ""})), failed_run(), "")
+    assert len(mails.raw) == 1
+
+
+def test_a_password_goes_to_no_server_that_does_not_encrypt() -> None:
+    with mail_server() as (mails, port), pytest.raises(NotDelivered, match="does not encrypt"):
+        deliver(mailbox(port, user="robots", password="schlüssel"), failed_run(), "")
+    assert not mails.raw
+
+
 def test_nobody_there_is_a_failure_with_a_reason() -> None:
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))

@@ -1,6 +1,7 @@
 """Each message is delivered once, as far as its receiver can tell by the id, or shown as failed."""
 
 import asyncio
+import logging
 import random
 import threading
 from collections import Counter
@@ -26,7 +27,7 @@ from action_assistant.web.notifications.outbox import RETRIES_S, DueMessage, id_
 from action_assistant.web.notifications.receivers import Receiver
 from action_assistant.web.notifications.sender import Notifications
 from support.doses import examples
-from web.notifications.receiving import http_receiver, mail_server, mailbox, webhook
+from web.notifications.receiving import http_receiver, mail_server, mailbox, tls, webhook
 
 HOUR = 3_600_000_000
 RECEIVERS = (webhook("https://a.example/", "a"), webhook("https://b.example/", "b"))
@@ -221,6 +222,34 @@ async def test_a_test_that_arrives_switches_a_receiver_on_again(tmp_path: Path) 
         assert receiver.got[2][1]["text"] == "This is a test of the receiver a, sent by Ann."
         with pytest.raises(NotFound):
             await sender.test("b", "Ann")
+    await journal.close()
+
+
+async def test_a_wrong_password_is_shown_repeated_and_logged_nowhere(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    journal, clock = await _open(tmp_path), Clock()
+    context, ca = tls(tmp_path / "tls", "localhost")
+    with mail_server(context, passwords={"robots": "the-Right-1"}) as (mails, port):
+        wrong = mailbox(port, name="a", ca=ca, user="robots", password="the-Wrong-1é")
+        sender = Notifications(
+            journal, [wrong], ["run.ended"], "", _seen_by_all, clock_us=clock, gap_s=0, look_s=0.01
+        )
+        await journal.append("run/x", [EVENT])
+        async with sender.sending():
+            await _until(lambda: _is_off(sender))
+        (state,) = await sender.states()
+        assert state.error == "It does not take the user or the password (535)."
+        assert mails.signed_in == [("PLAIN", False)] * (len(RETRIES_S) + 1)
+        right = mailbox(port, name="a", ca=ca, user="robots", password="the-Right-1")
+        sender = Notifications(journal, [right], ["run.ended"], "", _seen_by_all, gap_s=0)
+        assert (await sender.test("a", "Ann")).off == ""
+    assert len(mails.raw) == 1
+    own = [each for each in caplog.records if each.name.startswith("action_assistant")]
+    said = "\n".join([logging.Formatter().format(each) for each in own])
+    assert "It does not take the user or the password" in said
+    assert "-Wrong-" not in said + repr(await _rows(journal))
+    assert "-Right-" not in said + repr(await _rows(journal))
     await journal.close()
 
 

@@ -30,6 +30,7 @@ _STEP_S: Final = 10.0  # for one step of a conversation
 #: Seconds after which a try has failed, however slowly the receiver goes on.
 TRY_S: Final = 25.0
 _GONE: Final = 410
+_SIGNED_IN, _FOR_EVER = 235, 500  # of SMTP
 _PORTS: Final = {"http": 80, "https": 443}
 _LONGEST: Final = 200  # characters of a reason
 
@@ -129,10 +130,25 @@ def _mail(receiver: Mailbox, message: Message, page: str) -> None:
             if receiver.security == "starttls":
                 connection.starttls(context=_context(receiver.ca))
             if receiver.user:
-                connection.login(receiver.user, receiver.password)
+                _sign_in(connection, receiver.user, receiver.password)
             refused = connection.sendmail(receiver.sender, to, text)
     if refused:
         raise NotDelivered(f"It refused {', '.join(refused)}.", left=tuple(refused))
+
+
+def _sign_in(connection: smtplib.SMTP, user: str, password: str) -> None:
+    """Send the password to a mail server. smtplib sends ASCII alone; other characters go as UTF-8,
+    as RFC 4616 has it."""
+    if (user + password).isascii():
+        connection.login(user, password)
+        return
+    connection.ehlo_or_helo_if_needed()
+    if "PLAIN" not in connection.esmtp_features.get("auth", "").split():
+        raise NotDelivered("It takes no password with characters beyond ASCII.")
+    words = base64.b64encode(f"\0{user}\0{password}".encode()).decode()
+    code, answer = connection.docmd("AUTH", f"PLAIN {words}")
+    if code != _SIGNED_IN:
+        raise smtplib.SMTPAuthenticationError(code, answer)
 
 
 @contextmanager
@@ -206,8 +222,10 @@ def _why(error: Exception) -> str:
     """Return the reason of a failure, for people. Of what a receiver has sent only the number of an
     SMTP answer is shown."""
     match error:
+        case smtplib.SMTPAuthenticationError() if error.smtp_code < _FOR_EVER:
+            return f"It cannot check the password now ({error.smtp_code})."
         case smtplib.SMTPAuthenticationError():
-            return f"It does not take the password ({error.smtp_code})."
+            return f"It does not take the user or the password ({error.smtp_code})."
         case smtplib.SMTPNotSupportedError():
             return "It does not encrypt (no STARTTLS), or takes no password."
         case smtplib.SMTPRecipientsRefused():
