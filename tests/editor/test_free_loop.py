@@ -5,15 +5,14 @@ back, and the rows that this process reads, while the same thing is done with a 
 as large. A document as bytes is one value, however long it is.
 """
 
-import asyncio
 import json
 import pickletools
 import re
 import sys
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager, contextmanager
-from functools import partial, partialmethod
+from contextlib import contextmanager
+from functools import partialmethod
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final
@@ -31,6 +30,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.monitoring import monitoring
 from action_assistant.web.workers import lanes
+from editor.in_process import URL, browser, lifespan
 from editor.process import BEARER
 from support.openapi import documents
 from support.product import TOKEN
@@ -114,23 +114,6 @@ class Served:
         return self.work
 
 
-@asynccontextmanager
-async def lifespan(app: Any) -> AsyncIterator[None]:
-    """Start and end an application as its server does."""
-    heard: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-    said: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-    scope = {"type": "lifespan", "asgi": {"version": "3.0"}, "state": {}}
-    running = asyncio.create_task(app(scope, heard.get, said.put))
-    await heard.put({"type": "lifespan.startup"})
-    assert (await said.get())["type"] == "lifespan.startup.complete"
-    try:
-        yield
-    finally:
-        await heard.put({"type": "lifespan.shutdown"})
-        await said.get()
-        await running
-
-
 @pytest.fixture
 async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Served]:
     """An editor that counts, with real workers and a real database."""
@@ -146,13 +129,10 @@ async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterat
         data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}", port=8000, limits=False
     )
     app = create_app(settings)
-    transport = httpx.ASGITransport(app=app, client=("127.0.0.1", 5000))
-    url = "http://127.0.0.1:8000"
-    browser = partial(httpx.AsyncClient, transport=transport, base_url=url, timeout=60)
     async with (
         lifespan(app),
-        browser(headers=BEARER) as http,
-        browser(headers={"origin": url}) as second,
+        browser(app, headers=BEARER) as http,
+        browser(app, headers={"origin": URL}) as second,
     ):
         signed_in = await second.post("/api/session", json={"token": TOKEN, "name": "Ben"})
         assert signed_in.is_success

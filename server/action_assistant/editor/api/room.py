@@ -254,11 +254,13 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                         return
                     edits = may(identity, "edit", now=time.time()) == Allowed()
                     acks = _wants_acks(socket)
+                    # For those who only look as well; nothing may wait from here until they have joined.
+                    may_edit_here = await services.rights.admit(graph_id, identity)
                     with services.colours.held(person.id) as colour:
                         origin = origin_of(person.id)
                         member = Member(
                             person,
-                            edits=edits and await services.rights.admit(graph_id, identity),
+                            edits=edits and may_edit_here,
                             acks=acks,
                             colour=colour,
                             origin=origin,
