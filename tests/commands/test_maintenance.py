@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.cli import parser
+from action_assistant.cli import main, parser
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
@@ -63,3 +63,21 @@ def test_tables_are_made_again(data: Path, capsys: pytest.CaptureFixture[str]) -
 def test_a_folder_without_a_journal_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(CannotStart, match="no journal"):
         run("verify", "--data", str(tmp_path))
+
+
+@pytest.mark.parametrize("newer", [False, True])
+@pytest.mark.parametrize(
+    "words", [("backup", "{}.zip"), ("verify",), ("verify", "--head"), ("audit", "verify")]
+)
+def test_what_only_reads_a_folder_at_rest_leaves_nothing_beside_its_databases(
+    data: Path, words: tuple[str, ...], newer: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if newer:
+        change(data, "UPDATE alembic_version SET version_num = 'editor_9999'")
+    before = {each.name: each.read_bytes() for each in data.glob("*.db*")}
+    code = main([*(each.format(data.parent / "monday") for each in words), "--data", str(data)])
+    assert {each.name: each.read_bytes() for each in data.glob("*.db*")} == before
+    assert code == (2 if newer else 0)
+    if newer:
+        said = capsys.readouterr().err
+        assert f"The database {data / 'editor.db'} was made by a newer version" in said

@@ -17,6 +17,7 @@ from sqlalchemy import NullPool, create_engine
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.migrate import revisions_of, upgrade_to
+from action_assistant.journal.sqlite import reads
 from action_assistant.schema.branches import VERSIONS
 
 #: SQLite makes these by itself.
@@ -69,7 +70,7 @@ def look(path: Path, branch: Branch) -> Findings:
     """Compare the schema of the journal in the SQLite file `path` with the schema of this program,
     without changing it. An empty file has no findings. Raise CannotStart for a database of another
     program, sqlite3.Error if it cannot be read."""
-    with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as connection:
+    with closing(sqlite3.connect(f"{path.as_uri()}?{reads(path)}", uri=True)) as connection:
         return _compared(connection, branch)
 
 

@@ -414,7 +414,7 @@ def inspected(path: Path) -> tuple[int, list[Damage]]:
     """Return the number of events in the SQLite file `path` and their damages, at any revision of
     its tables. The file is not changed. Raise sqlite3.Error if it cannot be read."""
     inspector, after = Inspector(taken_out), 0
-    with closing(sqlite3.connect(f"{path.as_uri()}?{_reads(path)}", uri=True)) as database:
+    with closing(sqlite3.connect(f"{path.as_uri()}?{reads(path)}", uri=True)) as database:
         database.execute("BEGIN")
         database.execute("SELECT count(*) FROM sqlite_master").fetchone()
         database.text_factory = _lenient
@@ -429,12 +429,12 @@ def inspected(path: Path) -> tuple[int, list[Damage]]:
 def unchanged(path: Path) -> str:
     """Return the URL for reading the SQLite file `path` without changing it. If its write-ahead log
     is empty, no lock and no index file are made either."""
-    return f"sqlite:///file:{quote(str(path))}?uri=true&{_reads(path)}"
+    return f"sqlite:///file:{quote(str(path))}?uri=true&{reads(path)}"
 
 
-def _reads(path: Path) -> str:
-    """Return how an address of SQLite says that `path` is only read. Files beside it are made only
-    where its write-ahead log holds something: a reader may not remove them again."""
+def reads(path: Path) -> str:
+    """Return the option of an address by which SQLite only reads `path`. Files beside it are made
+    only where its write-ahead log holds something: a reader may not remove them again."""
     log = path.with_name(f"{path.name}-wal")
     return "mode=ro" if log.exists() and log.stat().st_size > 0 else "immutable=1"
 

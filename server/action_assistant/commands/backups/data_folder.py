@@ -112,8 +112,9 @@ def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> 
     def tell(_: int, remaining: int, total: int) -> None:
         progress.tell(f"{name}: {total - remaining} of {total} pages copied")
 
+    # What may not write could not remove the files beside the database again.
     with (
-        closing(sqlite3.connect(f"{source.as_uri()}?mode=ro", uri=True)) as there,
+        closing(sqlite3.connect(f"{source.as_uri()}?mode=rw", uri=True)) as there,
         closing(sqlite3.connect(target)) as here,
     ):
         target.chmod(0o600)

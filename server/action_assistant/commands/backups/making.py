@@ -36,6 +36,7 @@ from action_assistant.journal.copies.backup_state import BackupMade
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.journal.foreign_schema import remove_strangers
+from action_assistant.journal.migrate import recognize
 from action_assistant.schema.editor_tables import invitation
 from action_assistant.version import VERSION
 from action_assistant.web.auth.keys import TOKEN_FILE
@@ -67,6 +68,8 @@ def make_backup(
     `database`: the URL of the graphs, None for the folder's own. Raise CannotStart if that fails;
     no file is left then."""
     begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
+    for source in sources.values():
+        database_of(source).look(recognize)  # refuses a newer version's by its own name
     _check_room(data, sources, target.parent)
     with workshop(target.parent, WORK) as folder:
         events: dict[Branch, int] = {}
