@@ -1,7 +1,7 @@
 /** Work without a server: edits wait on the device, for one person, and are merged on return. */
 
 import { readFileSync } from "node:fs";
-import { expect, type Page, test } from "@playwright/test";
+import { expect, type Locator, type Page, test } from "@playwright/test";
 import { add, card, saved, umrfOf } from "./canvas";
 import { LONG, Product } from "./product";
 
@@ -61,6 +61,18 @@ function waiting(page: Page): Promise<Record<string, number>> {
   });
 }
 
+/** Return how many pixels of a text its row hides. */
+function cutOff(text: Locator): Promise<number> {
+  return text.evaluate((it) => {
+    let hidden = 0;
+    for (let row = it.parentElement; row !== null; row = row.parentElement) {
+      const over = it.getBoundingClientRect().right - row.getBoundingClientRect().right;
+      if (getComputedStyle(row).overflowX !== "visible") hidden = Math.max(hidden, over);
+    }
+    return Math.ceil(hidden);
+  });
+}
+
 test("edits made while the server is gone survive closing the tab and are merged on return", async ({
   browser,
 }) => {
@@ -74,6 +86,8 @@ test("edits made while the server is gone survive closing the tab and are merged
   await add(ada.page, "While");
   await offline(ada.page, 1);
   await expect.poll(() => waiting(ada.page).then(Object.values)).toEqual([1]);
+  await ada.page.setViewportSize({ width: 320, height: 844 }); // where the words need two lines
+  expect(await cutOff(ada.page.getByText(/Server away with/))).toBe(0);
   await ada.page.close();
   await product.start();
   await enter(mari.page, graph);

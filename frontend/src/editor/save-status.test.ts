@@ -12,7 +12,7 @@ test("Saved is shown only when nothing waits and the room is live", () => {
   expect(saveStatusText({ ...away, why: "no-network" }).words).toBe("Offline with 2 changes");
   expect(saveStatusText({ ...away, why: "proxy" }).words).toBe("Proxy error with 2 changes");
   expect(saveStatusText({ ...away, why: "not-stored" }).words).toBe(
-    "Server cannot store with 2 changes",
+    "Server cannot store 2 changes",
   );
   expect(saveStatusText({ state: "connecting", unsaved: 0, seq: 0 }).words).toBe("Opening");
   expect(saveStatusText({ state: "live", unsaved: 0, seq: 0 }, false).words).toBe("Opening");

@@ -74,7 +74,8 @@ export function saveStatusText(
   }
   const state = link.why === undefined ? "Server away" : whys[link.why];
   if (link.unsaved === 0) return { tone: "off", words: state };
-  return { tone: "off", words: `${state} with ${counted(link.unsaved, "change")}` };
+  const joint = link.why === "not-stored" ? "" : " with";
+  return { tone: "off", words: `${state}${joint} ${counted(link.unsaved, "change")}` };
 }
 
 const signs = {
@@ -115,7 +116,7 @@ export function SaveStatus() {
         tabIndex={why === null ? undefined : 0}
         title={why === null ? `Moment ${link.seq}` : undefined}
       >
-        <Sign size={13} stroke={2.6} aria-hidden /> {words}
+        <Sign size={13} stroke={2.6} aria-hidden /> <span>{words}</span>
         {link.state === "refused" && (
           <button type="button" className={style.again} onClick={() => room.reconnect()}>
             Try again
