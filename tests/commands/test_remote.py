@@ -5,6 +5,7 @@ import socket
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -247,7 +248,9 @@ def test_a_led_run_takes_the_breakpoints_of_its_graph_where_the_command_says_so(
         product.cli("stop", run)
 
 
-def test_a_led_run_opens_no_sub_graph_whose_breakpoints_it_would_not_keep(product: Product) -> None:
+def test_an_opened_run_takes_the_breakpoints_inside_and_so_does_one_that_continues_it(
+    product: Product,
+) -> None:
     outer = {
         "graph_name": "around",
         "graph_entry": [{"name": "marked"}],
@@ -257,14 +260,38 @@ def test_a_led_run_opens_no_sub_graph_whose_breakpoints_it_would_not_keep(produc
     with product.editor() as editor:
         inner = editor.post("/api/graphs", json={**GRAPH, "graph_name": "marked"}).json()["id"]
         graph = editor.post("/api/graphs", json=outer).json()["id"]
-    anyio.run(wait_at, product, inner, "B", '{"by": "ada"}')
-    started = ("run", graph, "--robots", "=simulator", "--into", "--no-wait")
-    refused = product.cli(*started, "--breakpoints")
-    assert refused.returncode == 2
-    assert "marked has breakpoints inside, which do not hold with --into" in refused.stderr
+        # The version is older than the breakpoint, which is no part of it.
+        editor.post(f"/api/graphs/{graph}/versions", json={})
+    anyio.run(wait_at, product, inner, "B", '{"visit": 7, "by": "ada"}')
+    started = ("run", graph, "--robots", "=simulator", "--no-wait")
+    led = partial(_started, product)
+    assert not led(*started, "--into").get("breakpoints")
+    assert not led(*started, "--breakpoints").get("breakpoints")
+    first = led(*started, "--into", "--breakpoints")
+    (mark,) = first["breakpoints"]
+    assert first["actions"][mark["action"]]["levels"] == ["marked_0"]
+    assert set(mark) == {"action"}, "visits of a sub-graph are none of the whole graph"
     with product.runner() as runner:
-        assert runner.get("/api/runs", params={"graph": graph}).json() == []
-    assert product.cli(*started).returncode == 0
+        anyio.run(until, lambda: shown(runner, first["id"])["held"] is not None)
+        held = shown(runner, first["id"])["held"]
+        assert held["how"] == "breakpoint"
+        product.cli("stop", first["id"])
+    waiting = led(*started, "--from", first["id"], "--breakpoints")
+    assert waiting["breakpoints"] == [mark]
+    product.cli("stop", waiting["id"])
+
+
+def _started(product: Product, *command: str) -> dict[str, Any]:
+    """Start a run by this command, and return it."""
+    answer = product.cli(*command)
+    assert answer.returncode == 0, answer.stderr
+    with product.runner() as runner:
+        return shown(runner, answer.stdout.split()[0])
+
+
+def shown(runner: httpx.Client, run: str) -> dict[str, Any]:
+    found: dict[str, Any] = runner.get(f"/api/runs/{run}").json()
+    return found
 
 
 async def until(true: Callable[[], bool]) -> None:

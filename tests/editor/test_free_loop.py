@@ -234,6 +234,7 @@ ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "listVersions": ("GET", "/api/graphs/{g}/versions", None),
     "publishVersion": ("POST", "/api/graphs/{g}/versions", {"label": "one"}),
     "getVersion": ("GET", "/api/versions/{v}", None),
+    "getVersionBreakpoints": ("GET", "/api/versions/{v}/breakpoints", None),
     "getSight": ("GET", "/api/versions/{v}/sight", None),
     "releaseVersion": ("PUT", "/api/versions/{v}/release", None),
     "withdrawRelease": ("DELETE", "/api/versions/{v}/release", None),

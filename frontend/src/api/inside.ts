@@ -1,5 +1,6 @@
 /** The graphs inside of a graph, by value: what goes along with starts, looks and expected courses. */
 import { useQuery } from "@tanstack/react-query";
+import type { RunBreakpoint } from "../graph/breakpoints";
 import { editor } from "./client";
 import type { GraphSummary } from "./graphs";
 import type { Inside } from "./runs";
@@ -26,6 +27,27 @@ export async function fetchInside(
 ): Promise<Inside> {
   const request = { path: inGraph(graph), query: { at: seq }, signal };
   return insideOf(await editor.get("/api/graphs/{graph_id}/subgraphs", request));
+}
+
+/**
+ * Fetch the breakpoints that the graphs inside of a moment, or of a version that is started once more, have now: a
+ * start that opens them names these.
+ */
+export async function fetchBreakpointsInside(
+  graph: string,
+  seq: number,
+  version: string | undefined,
+  signal?: AbortSignal,
+): Promise<RunBreakpoint[]> {
+  const all: RunBreakpoint[] =
+    version === undefined
+      ? await editor.get("/api/graphs/{graph_id}/breakpoints", {
+          ...{ path: inGraph(graph), query: { at: seq, inside: true }, signal },
+        })
+      : await editor.get("/api/versions/{version_id}/breakpoints", {
+          ...{ path: { version_id: version }, signal },
+        });
+  return all.filter(({ inside }) => Boolean(inside));
 }
 
 /** Gives the actions that stand for a graph in these others its new name. Answers where there were some. */

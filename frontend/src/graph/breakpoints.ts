@@ -46,6 +46,8 @@ export interface RunBreakpoint {
   readonly visit?: number;
   readonly outcomes?: readonly End[];
   readonly value?: ValueTest | null;
+  /** The name of the sub-graph in which both actions stand, wherever a start opens that. */
+  readonly inside?: string;
 }
 
 const MOST_VISITS = 1_000_000;

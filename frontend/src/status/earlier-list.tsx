@@ -8,13 +8,13 @@ import { isolated } from "../words/isolated";
 import style from "./earlier-list.module.css";
 
 /** The place where a start begins. `run`, `number`: the earlier run, "" and 0 for none; `at`: full names of the
- * actions, none if that run is continued where it ended; `opened`: that run had opened its sub-graphs. */
+ * actions, none if that run is continued where it ended; `opened`: its version, if that run had opened its sub-graphs. */
 export interface Beginning {
   readonly run: string;
   readonly number: number;
   readonly at: readonly string[];
   readonly only: boolean;
-  readonly opened?: boolean;
+  readonly opened?: string;
 }
 
 /** Return whether the actions inside of sub-graphs were steps of their own: the version has none of these. */

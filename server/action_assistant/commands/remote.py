@@ -388,7 +388,8 @@ def _run(options: argparse.Namespace) -> int:
             led = {"robots": continued["robots"], "lost": options.lost}
             led |= {"people": continued["people"]} if "people" in continued else {}
             order |= {"engine": "conducted", "values": continued.get("values", {}), **led}
-        breakpoints = _breakpoints(server, version, options)
+        opens = options.into or (continued is not None and _is_opened(continued))
+        breakpoints = _breakpoints(server, version, options, opens=opens)
         if breakpoints:
             order["breakpoints"] = breakpoints
         if options.watching:
@@ -416,29 +417,28 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _breakpoints(
-    server: Server, version: dict[str, Any], options: argparse.Namespace
+    server: Server, version: dict[str, Any], options: argparse.Namespace, *, opens: bool
 ) -> list[dict[str, Any]]:
     """Return where a run of a version waits: as the command says, and, if it says so, at the breakpoints
-    of the graph. Of two before one action that of the command counts. Raise CannotStart if the run opens
-    sub-graphs that have breakpoints of their own, which it would not keep."""
+    of the graph, with those inside of the sub-graphs that the run `opens`. Of two before one action that
+    of the command counts."""
     chosen: list[dict[str, Any]] = options.breaks
     if not options.breakpoints:
         return chosen
-    for each in version.get("subgraphs", ()) if options.into else ():
-        if server.editor("GET", f"/api/graphs/{each['graph']}/breakpoints").json():
-            raise CannotStart(
-                f"{each['name']} has breakpoints inside, which do not hold with --into: remove them, or "
-                "leave --into out."
-            )
-    path = f"/api/graphs/{version['graph']}/breakpoints"
-    kept = server.editor("GET", path, params={"at": version["seq"]}).json()
+    kept = server.editor("GET", f"/api/versions/{version['id']}/breakpoints").json()
     said = {each["action"] for each in chosen}
     of_graph = (
         each
         for each in kept
-        if each["action"] not in said or not {"to", "outcomes"}.isdisjoint(each)
+        if (opens or "inside" not in each)
+        and (each["action"] not in said or not {"to", "outcomes", "inside"}.isdisjoint(each))
     )
     return [*chosen, *of_graph]
+
+
+def _is_opened(run: dict[str, Any]) -> bool:
+    """Return whether the actions inside of sub-graphs were steps of their own in a run."""
+    return any("levels" in each for each in run["actions"].values())
 
 
 def _values(

@@ -56,13 +56,15 @@ class Breakpoint(
     """Lets a led run wait before the action with the full name `action` begins; after it has ended, if
     it has `outcomes`; or when it has ended and the arrow to the action `to` ("exit": the end of the
     graph) lets that go on. `visit`: only at this visit of `action`, from 1; 0 for each. `value`: only
-    if an input meets this, or, after its end, an output."""
+    if an input meets this, or, after its end, an output. `inside`: the name of the sub-graph in which
+    both actions stand: it counts wherever the start of the run opens that; "" for the graph itself."""
 
     action: _Name
     to: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     visit: Annotated[int, msgspec.Meta(ge=0, le=1_000_000)] = 0
     outcomes: tuple[Told, ...] = ()
     value: ValueTest | None = None
+    inside: Annotated[str, msgspec.Meta(max_length=1000)] = ""
 
     @property
     def is_at_end(self) -> bool:
@@ -80,6 +82,7 @@ class Breakpoint(
         return "".join(
             (
                 place,
+                f" of {self.inside}" if self.inside else "",
                 f" ended {when}" if self.outcomes and not self.to else "",
                 f", towards {self.to}" if self.to else "",
                 f", visit {self.visit}" if self.visit else "",
@@ -151,6 +154,8 @@ def pinned(graph: Graph, breakpoints: Iterable[Breakpoint]) -> tuple[Breakpoint,
     found: dict[tuple[str, str, bool], Breakpoint] = {}
     names = {each.full_name: each for each in graph.actions if not each.missing}
     for each in breakpoints:
+        if each.inside:
+            raise NoSuchPlace(f"No sub-graph {each.inside} is opened.")
         action = names.get(each.action)
         if action is None:
             raise NoSuchPlace(f"There is no action {each.action}.")

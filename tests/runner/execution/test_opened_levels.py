@@ -154,6 +154,50 @@ async def test_a_breakpoint_that_has_no_place_in_the_opened_graph_is_refused() -
 
 
 @virtual
+async def test_an_opened_run_waits_inside_of_each_sub_graph_and_so_does_one_that_continues_it() -> (
+    None
+):
+    lab = Lab({"*": [{"after_s": 1}]})
+    first, last = (each.full_name for each in going_on(PICK).actions)
+    inside = (Breakpoint(action=first, to=last, inside="Pick"),)
+    request = opened(PICK, request_id="first", breakpoints=inside)
+    async with lab.runner() as control:
+        run = (await control.start(request, ANN)).run.id
+        await until(lambda: control.open[run].run.held is not None)
+        assert len(lab.david.starts) == 1
+        (mark,) = control.open[run].run.breakpoints
+        assert (mark.inside, bool(mark.to)) == ("", True)
+        await control.stop(run, BEN)
+        await ended(control, run)
+        again = msgspec.structs.replace(
+            request, start_from=StartFrom(run=run), request_id="second", levels="one_step"
+        )
+        before = msgspec.structs.replace(
+            again, breakpoints=(Breakpoint(action=last, inside="Pick"),)
+        )
+        other = (await control.start(before, ANN)).run.id
+        await until(lambda: control.open[other].run.held is not None)
+        assert control.open[other].run.breakpoints == (Breakpoint(action=mark.to),)
+        assert len(lab.david.starts) == 1
+
+
+@virtual
+async def test_a_breakpoint_inside_that_the_run_would_not_keep_refuses_the_start() -> None:
+    lab = Lab()
+    async with lab.runner() as control:
+        for levels, inside, why in (
+            ("one_step", "Pick", "No sub-graph Pick is opened"),
+            ("opened", "Drop", "There is no sub-graph Drop"),
+            ("opened", "Pick", "In Pick: There is no action Work_9"),
+        ):
+            marks = (Breakpoint(action="Work_9", inside=inside),)
+            request = msgspec.structs.replace(opened(PICK, breakpoints=marks), levels=levels)
+            with pytest.raises(BadInput, match=why):
+                await control.start(request, ANN)
+        assert not control.open
+
+
+@virtual
 async def test_a_sub_graph_that_is_not_known_to_do_the_same_is_not_opened() -> None:
     lab = Lab()
     ends_never = named(sequence("Pick", 2), "Work")

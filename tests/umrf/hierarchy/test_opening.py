@@ -32,7 +32,6 @@ from runner.harness import sequence
 from support.doses import examples
 from umrf.hierarchy.hierarchies import (
     BYPASS,
-    TOP,
     Course,
     Hierarchy,
     course,
@@ -48,9 +47,12 @@ def task(inside: int = 2) -> OpenedGraph:
     return opened(graph, {"Pick": going_on(sequence("Pick", inside))})
 
 
+INSIDE = {"Pick": going_on(sequence("Pick", 2))}
+
+
 def translated(found: OpenedGraph, **place: object) -> list[tuple[str, str, tuple[Told, ...]]]:
     each = msgspec.convert(place, Breakpoint)
-    return [(one.action, one.to, one.outcomes) for one in opened_breakpoints(found, [each])]
+    return [(one.action, one.to, one.outcomes) for one in opened_breakpoints(found, [each], INSIDE)]
 
 
 def test_the_opened_graph_keeps_its_name_and_says_where_its_actions_are() -> None:
@@ -77,7 +79,7 @@ def test_a_breakpoint_at_a_sub_graph_is_where_that_begins_or_ends() -> None:
 
 def test_a_value_that_the_first_action_inside_lacks_is_no_condition() -> None:
     test = ValueTest("nothing", "==", 1.0)
-    (one,) = opened_breakpoints(task(), [Breakpoint(action="Pick_0", value=test)])
+    (one,) = opened_breakpoints(task(), [Breakpoint(action="Pick_0", value=test)], INSIDE)
     assert one.value is None
 
 
@@ -96,6 +98,7 @@ def test_visits_of_a_sub_graph_are_no_visits_of_its_actions_and_a_place_that_has
             Breakpoint(action="Work_0", to="Pick_0", visit=2),
             Breakpoint(action="Pick_0", to="Work_2", visit=1),
         ],
+        INSIDE,
     )
     assert inside == (
         Breakpoint(action=first),
@@ -108,7 +111,7 @@ def test_visits_of_a_sub_graph_are_no_visits_of_its_actions_and_a_place_that_has
 @pytest.mark.parametrize(("action", "to"), [("Pick_0", "Work_9"), ("Work_2", "Pick_0")])
 def test_a_breakpoint_for_which_nothing_stands_is_refused(action: str, to: str) -> None:
     with pytest.raises(NoSuchPlace, match="no place for a breakpoint after"):
-        opened_breakpoints(task(), [Breakpoint(action=action, to=to)])
+        opened_breakpoints(task(), [Breakpoint(action=action, to=to)], INSIDE)
 
 
 def test_the_end_of_a_sub_graph_is_also_where_its_last_action_is_bypassed() -> None:
@@ -132,6 +135,51 @@ def test_the_end_of_a_sub_graph_is_also_where_its_last_action_is_bypassed() -> N
     ]
 
 
+def test_a_breakpoint_of_a_sub_graph_counts_wherever_that_stands() -> None:
+    """`Pick` stands twice, once inside of `Fetch`; its `to="exit"` is no end of the graph itself."""
+    pick = INSIDE["Pick"]
+    first, last = (each.full_name for each in pick.actions)
+    graphs = {"Pick": pick, "Fetch": going_on(named(sequence("Fetch", 2), "Pick", "Work"))}
+    found = opened(going_on(named(sequence("task", 3), "Pick", "Fetch", "Work")), graphs)
+    here = {each: path[-1].action for each, path in found.paths.items() if path[-1].graph == "Pick"}
+    firsts = {each for each, name in here.items() if name == first}
+    lasts = set(here) - firsts
+    assert len(firsts) == len(lasts) == 2
+
+    def placed(**place: object) -> list[Breakpoint]:
+        return list(opened_breakpoints(found, [msgspec.convert(place, Breakpoint)], graphs))
+
+    assert {each.action for each in placed(action=first, inside="Pick", visit=7)} == firsts
+    assert {each.visit for each in placed(action=first, inside="Pick", visit=7)} == {0}
+    ends = placed(action=last, to="exit", inside="Pick")
+    assert {each.action for each in ends} == lasts
+    assert {(each.to, each.outcomes) for each in ends} == {("", TOLD)}
+    between = placed(action=first, to=last, inside="Pick")
+    assert {(each.action, each.to) for each in between} == {
+        (one, other)
+        for one in firsts
+        for other in lasts
+        if found.paths[one][:-1] == found.paths[other][:-1]
+    }
+    (around,) = placed(action="Pick_0", inside="Fetch")
+    assert around.action in firsts
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ({"action": "Work_9", "inside": "Pick"}, "In Pick: There is no action Work_9."),
+        ({"action": "Work_0", "inside": "Drop"}, "There is no sub-graph Drop."),
+        ({"action": "Work_0", "to": "exit", "inside": "Pick"}, "There is no arrow from Work_0"),
+    ],
+)
+def test_a_breakpoint_that_the_sub_graph_has_no_place_for_is_refused(
+    place: dict[str, str], why: str
+) -> None:
+    with pytest.raises(NoSuchPlace, match=why):
+        opened_breakpoints(task(), [msgspec.convert(place, Breakpoint)], INSIDE)
+
+
 def test_what_is_not_known_to_do_the_same_is_not_opened() -> None:
     graph = going_on(named(sequence("task", 2), "Pick"))
     with pytest.raises(CannotOpen, match="one by one"):
@@ -142,24 +190,52 @@ def test_what_is_not_known_to_do_the_same_is_not_opened() -> None:
 
 
 def waits(
-    own: Mapping[str, list[tuple[float, str]]], breakpoints: Iterable[Breakpoint]
+    own: Mapping[str, list[tuple[float, str]]],
+    breakpoints: Iterable[Breakpoint],
+    standing: Mapping[tuple[str, str], Collection[str]],
 ) -> set[float]:
-    """Return when a run with this course would wait at breakpoints without values."""
+    """Return when a run with this course would wait at breakpoints without values. `standing`: the places
+    of the actions of sub-graphs, by graph and full name there."""
     found = set[float]()
     for each in breakpoints:
-        visit, runs = 0, False
-        for at, what in own.get(each.action, ()):
-            if what == "RUNNING":
-                visit, runs = visit + 1, True
-                is_here = not each.is_at_end
-            elif what.startswith("ends"):
-                is_here = runs and what.removeprefix("ends on_") in each.outcomes
-                runs = False
-            else:
-                continue
-            if is_here and each.visit in {0, visit}:
-                found.add(at)
+        for name in standing.get((each.inside, each.action), (each.action,)):
+            visit, runs = 0, False
+            for at, what in own.get(name, ()):
+                if what == "RUNNING":
+                    visit, runs = visit + 1, True
+                    is_here = not each.is_at_end
+                elif what.startswith("ends"):
+                    is_here = runs and what.removeprefix("ends on_") in each.outcomes
+                    runs = False
+                else:
+                    continue
+                if is_here and each.visit in {0, visit}:
+                    found.add(at)
     return found
+
+
+def places_of(found: Flattened) -> dict[tuple[str, str], str]:
+    """Return a name for each action at each level of a hierarchy, by running graph and full name there."""
+    names = dict[tuple[str, str], str]()
+    for origin in found.origins:
+        running, path = found.graph.name, ""
+        for level in origin.levels:
+            path += f"/{level.action}"
+            names[running, level.action] = path
+            action, _, number = level.action.rpartition("_")
+            running += f"__{action}__{number}"
+    return names
+
+
+def standing_in(found: Flattened) -> dict[tuple[str, str], set[str]]:
+    """Return the names of `places_of` by graph and full name there; by "" and full name for the top graph."""
+    standing = dict[tuple[str, str], set[str]]()
+    for origin in found.origins:
+        path = ""
+        for depth, level in enumerate(origin.levels):
+            path += f"/{level.action}"
+            standing.setdefault((level.graph if depth else "", level.action), set()).add(path)
+    return standing
 
 
 def played(
@@ -169,19 +245,18 @@ def played(
     places = nested_names(found)
     deep = Script({f"{run}/{name}": behaviours[flat] for flat, (run, name) in places.items()})
     wide = Script({f"{found.graph.name}/{flat}": calls for flat, calls in behaviours.items()})
-    top = {(TOP, each.full_name): each.full_name for each in hierarchy.graph.actions}
     alike = {(found.graph.name, flat): flat for flat in places}
     return (
-        course(hierarchy.graph, hierarchy.graphs, deep, top),
+        course(hierarchy.graph, hierarchy.graphs, deep, places_of(found)),
         course(found.graph, {}, wide, alike),
     )
 
 
-def marks(draw: st.DrawFn, graph: Graph, inside: Collection[str]) -> list[Breakpoint]:
-    """A few breakpoints at sub-graphs (`inside`) that a run of the graph could have."""
+def marks(draw: st.DrawFn, graph: Graph, chosen: Collection[str]) -> list[Breakpoint]:
+    """A few breakpoints at actions with these names that a run of the graph could have."""
     places: list[tuple[str, str, bool]] = []
     names = {each.key: each.full_name for each in graph.actions} | {"exit": "exit"}
-    subs = {each.key for each in graph.actions if each.name in inside}
+    subs = {each.key for each in graph.actions if each.name in chosen}
     places += [(names[key], "", is_at_end) for key in subs for is_at_end in (False, True)]
     places += [
         (names[each.parent], names[each.child], True)
@@ -219,11 +294,16 @@ def marked(draw: st.DrawFn) -> tuple[Hierarchy, tuple[Breakpoint, ...]]:
         for name, graph in drawn.graphs.items()
     }
     try:
-        return Hierarchy(drawn.graph, graphs), pinned(
-            drawn.graph, marks(draw, drawn.graph, drawn.graphs)
-        )
+        own = pinned(drawn.graph, marks(draw, drawn.graph, drawn.graphs))
+        inner = [
+            replace(each, inside=name)
+            for name, graph in graphs.items()
+            if draw(st.booleans())
+            for each in pinned(graph, marks(draw, graph, {action.name for action in graph.actions}))
+        ]
     except NoSuchPlace:
         return drawn, ()
+    return Hierarchy(drawn.graph, graphs), (*own, *inner)
 
 
 def test_an_opened_run_waits_wherever_the_graph_itself_would_or_its_breakpoints_are_refused() -> (
@@ -243,7 +323,7 @@ def test_an_opened_run_waits_wherever_the_graph_itself_would_or_its_breakpoints_
             return
         found = opened(hierarchy.graph, hierarchy.graphs)
         try:
-            inside = pinned(found.graph, opened_breakpoints(found, breakpoints))
+            inside = pinned(found.graph, opened_breakpoints(found, breakpoints, hierarchy.graphs))
         except NoSuchPlace:
             told["refused"] += 1
             return
@@ -261,9 +341,11 @@ def test_an_opened_run_waits_wherever_the_graph_itself_would_or_its_breakpoints_
                 for place, each in enumerate(flat.origins)
             }
             nested, opens = played(hierarchy, flat, results)
-            before, after = waits(nested.own, breakpoints), waits(opens.own, inside)
+            before = waits(nested.own, breakpoints, standing_in(flat))
+            after = waits(opens.own, inside, {})
             told["waits"] += len(before)
+            told["inside"] += any(each.inside for each in breakpoints) and len(before)
             assert before <= after
 
     play()
-    assert told["waits"] > told["refused"]
+    assert told["waits"] > told["inside"] > told["refused"]

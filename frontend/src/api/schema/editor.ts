@@ -242,7 +242,8 @@ export interface EditorApi {
      * @description Lets a led run wait before the action with the full name `action` begins; after it has ended, if
      *     it has `outcomes`; or when it has ended and the arrow to the action `to` ("exit": the end of the
      *     graph) lets that go on. `visit`: only at this visit of `action`, from 1; 0 for each. `value`: only
-     *     if an input meets this, or, after its end, an output.
+     *     if an input meets this, or, after its end, an output. `inside`: the name of the sub-graph in which
+     *     both actions stand: it counts wherever the start of the run opens that; "" for the graph itself.
      */
     Breakpoint: {
         action: string;
@@ -253,6 +254,8 @@ export interface EditorApi {
         /** @default [] */
         outcomes?: ("error" | "false" | "true")[];
         value?: EditorApi["ValueTest"];
+        /** @default  */
+        inside?: string;
     };
     /**
      * BuildFault
@@ -2872,6 +2875,9 @@ export interface EditorPaths {
     "/api/versions/{version_id}": {
         get: EditorOperations["getVersion"];
     };
+    "/api/versions/{version_id}/breakpoints": {
+        get: EditorOperations["getVersionBreakpoints"];
+    };
     "/api/versions/{version_id}/sight": {
         get: EditorOperations["getSight"];
     };
@@ -3665,6 +3671,7 @@ interface EditorOperations {
         parameters: {
             query?: {
                 at?: number | null;
+                inside?: boolean;
             };
             path: {
                 graph_id: string;
@@ -4155,6 +4162,20 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["VersionView"];
+                };
+            };
+        };
+    };
+    getVersionBreakpoints: {
+        parameters: {
+            path: {
+                version_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Breakpoint"][];
                 };
             };
         };

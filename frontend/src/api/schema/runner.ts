@@ -493,7 +493,8 @@ export interface RunnerApi {
      * @description Lets a led run wait before the action with the full name `action` begins; after it has ended, if
      *     it has `outcomes`; or when it has ended and the arrow to the action `to` ("exit": the end of the
      *     graph) lets that go on. `visit`: only at this visit of `action`, from 1; 0 for each. `value`: only
-     *     if an input meets this, or, after its end, an output.
+     *     if an input meets this, or, after its end, an output. `inside`: the name of the sub-graph in which
+     *     both actions stand: it counts wherever the start of the run opens that; "" for the graph itself.
      */
     Breakpoint: {
         action: string;
@@ -505,6 +506,8 @@ export interface RunnerApi {
         outcomes?: ("error" | "false" | "true")[];
         /** @default null */
         value?: RunnerApi["ValueTest"] | null;
+        /** @default  */
+        inside?: string;
     };
     /**
      * BreakpointsRequest

@@ -105,7 +105,7 @@ export function ContinueButton({ run }: { run: Run }) {
               number: run.number,
               at: [],
               only: false,
-              opened: isOpened(run),
+              ...(isOpened(run) && { opened: version.id }),
             }}
             onChosen={() => undefined}
             onClose={() => setAsking(false)}

@@ -2,16 +2,7 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Robot } from "../../api/robots";
 import { rolesIn } from "../../graph/questions";
-import {
-  actionsInside,
-  actorsIn,
-  castObstacle,
-  castOf,
-  marksInsideWords,
-  marksObstacle,
-  movesWords,
-  whyOff,
-} from "./led-choice";
+import { actionsInside, actorsIn, castObstacle, castOf, movesWords, whyOff } from "./led-choice";
 
 const robot = (name: string, part: object = {}) =>
   ({ name, simulated: false, led: true, state: "answering", ...part }) as Robot;
@@ -55,15 +46,6 @@ test("the questions inside of sub-graphs ask their roles, at each level", () => 
   ];
   expect(rolesIn(actionsInside(inside))).toEqual(["Cook", "Guard"]);
   expect(actionsInside(null)).toEqual([]);
-});
-
-test("breakpoints inside of sub-graphs keep these from being opened until they are gone", () => {
-  expect(marksObstacle(undefined)).toBe("Looking …");
-  expect(marksObstacle(["Pick"])).toBe("There are breakpoints inside");
-  expect(marksObstacle([])).toBeNull();
-  expect(marksInsideWords(["Pick", "Place"])).toMatch(/^Breakpoints inside of .*Pick.*, .*Place/);
-  expect(marksInsideWords(["Pick"])).toContain("or start with");
-  expect(marksInsideWords(["Pick"], true)).toMatch(/opened: remove them\.$/); // a run is continued as it was led
 });
 
 test("levels that double are read once for each actor, and a graph inside of itself is no circle", () => {

@@ -1,9 +1,7 @@
 /** The choices of a start that the runner leads step by step: who plays whom, and what a lost robot causes. */
 import { NativeSelect, Text } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
-import { editor } from "../../api/client";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay } from "../../api/people";
@@ -158,61 +156,13 @@ export function WayChoice({ led, several, onLed }: WayProps) {
   );
 }
 
-/** Fetch the names of the graphs inside of a moment, as they are now, that have breakpoints of their own. */
-async function fetchMarkedInside(
-  graph: string,
-  seq: number,
-  signal: AbortSignal,
-): Promise<string[]> {
-  const request = { path: { graph_id: graph }, query: { at: seq }, signal };
-  const { subgraphs } = await editor.get("/api/graphs/{graph_id}/subgraphs", request);
-  const marks = await Promise.all(
-    subgraphs.map((each) =>
-      editor.get("/api/graphs/{graph_id}/breakpoints", { path: { graph_id: each.graph }, signal }),
-    ),
-  );
-  return subgraphs.filter((_, i) => (marks[i]?.length ?? 0) > 0).map(({ name }) => name);
-}
-
-const AGAIN = 5_000; // ms
-
-/** Query which graphs inside of a moment have breakpoints: a start that opens them takes none of these. */
-export function useMarkedInside(graph: string, seq: number, enabled: boolean) {
-  return useQuery({
-    queryKey: ["breakpoints inside", graph, seq],
-    queryFn: ({ signal }) => fetchMarkedInside(graph, seq, signal),
-    enabled,
-    refetchInterval: AGAIN,
-    staleTime: 0,
-    gcTime: 0,
-  });
-}
-
-/**
- * Return what breakpoints inside of these graphs mean for a start that opens them, or `continues` a run that had
- * opened them; "" for none.
- */
-export function marksInsideWords(names: readonly string[], continues = false): string {
-  if (names.length === 0) return "";
-  const where = `${names.slice(0, 3).map(isolated).join(", ")}${names.length > 3 ? " and others" : ""}`;
-  return `Breakpoints inside of ${where} do not hold when sub-graphs are opened: remove them${continues ? "" : ", or start with sub-graphs as one step each"}.`;
-}
-
-/** Return why nothing is started that opens sub-graphs, of which these have breakpoints; null if it may be. */
-export function marksObstacle(marked: readonly string[] | undefined): string | null {
-  if (marked === undefined) return "Looking …";
-  return marked.length > 0 ? "There are breakpoints inside" : null;
-}
-
 interface LevelsChoiceProps {
   opened: boolean;
-  /** The graphs inside that have breakpoints of their own. */
-  marked: readonly string[];
   onOpened: (opened: boolean) => void;
 }
 
 /** The choice between sub-graphs that are one step each, and the actions inside as steps. */
-export function LevelsChoice({ opened, marked, onOpened }: LevelsChoiceProps) {
+export function LevelsChoice({ opened, onOpened }: LevelsChoiceProps) {
   const ways = [
     [false, "One step each: a robot gets the whole sub-graph at once"],
     [true, "Opened: each action inside is a step of its own"],
@@ -233,11 +183,6 @@ export function LevelsChoice({ opened, marked, onOpened }: LevelsChoiceProps) {
           </label>
         ))}
       </div>
-      {opened && marked.length > 0 && (
-        <Text size="sm" className="ink-warn" role="alert">
-          {marksInsideWords(marked)}
-        </Text>
-      )}
     </fieldset>
   );
 }

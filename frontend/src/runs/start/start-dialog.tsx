@@ -5,7 +5,6 @@ import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
-import { fetchDocument } from "../../api/history";
 import { errorText } from "../../api/http";
 import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
@@ -16,10 +15,8 @@ import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/ro
 import type { Run, Watching } from "../../api/runs";
 import { runPreflight, type StartFrom, type StartValues } from "../../api/starts";
 import { fromUmrf } from "../../canvas/from-umrf";
-import { type RunBreakpoint, startBreakpoints } from "../../graph/breakpoints";
-import { mapsFrom } from "../../graph/document-keys";
+import type { RunBreakpoint } from "../../graph/breakpoints";
 import { isReadyMade, rolesIn } from "../../graph/questions";
-import { readGraph } from "../../graph/read";
 import { type Beginning, beginningWords } from "../../status/earlier-list";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
@@ -39,16 +36,14 @@ import {
   castOf,
   LedChoice,
   LevelsChoice,
-  marksInsideWords,
-  marksObstacle,
   movesWords,
   PeopleChoice,
-  useMarkedInside,
   WayChoice,
 } from "./led-choice";
 import { PreflightList } from "./preflight-list";
 import { mayWait, QueueOffer } from "./queue-choice";
 import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
+import { useAllBreakpoints, useBreakpoints } from "./start-breakpoints";
 import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";
 import { useStartFrom } from "./start-from";
@@ -88,18 +83,6 @@ function useInside(graph: string, seq: number) {
     queryKey: ["inside", graph, seq],
     queryFn: ({ signal }) => fetchInside(graph, seq, signal),
     staleTime: 0,
-  });
-}
-
-/** Query where a led run of this moment waits, as it was drawn then. */
-function useBreakpoints(graph: string, seq: number) {
-  return useQuery({
-    queryKey: ["breakpoints", graph, seq],
-    queryFn: async ({ signal }) => {
-      const document = await fetchDocument(graph, seq, signal);
-      return startBreakpoints(readGraph(mapsFrom(document)));
-    },
-    staleTime: Number.POSITIVE_INFINITY,
   });
 }
 
@@ -302,8 +285,8 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const { now } = useLive();
   const may = useMay("operate");
   const text = useText(graph, seq);
-  const inside = useInside(graph, seq);
   const marks = useBreakpoints(graph, seq);
+  const inside = useInside(graph, seq);
   // Without an answer only the actors of the graph itself are known; the look says what is missing.
   const graphs = inside.isPending ? null : inside.data?.subgraphs;
   const actors = useMemo(() => actorsIn(text.data, graphs), [text.data, graphs]);
@@ -324,12 +307,11 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const led = continues || asks || (wanted ?? (several || waits));
   const offered = !continues && !asks && (several || waits || led || mayLead);
   const cast = castOf(actors, picked, now.engines, may);
-  const [opens, setOpens] = useState(before?.levels === "opened");
+  const [wish, setOpens] = useState(before?.levels === "opened");
   const mayOpen = led && beginning === undefined && (graphs?.length ?? 0) > 0;
-  const opened = mayOpen && opens;
-  const isInside = opened || beginning?.opened === true;
-  const marked = useMarkedInside(graph, seq, isInside);
-  const unheld = isInside ? marksObstacle(marked.data) : null;
+  const opened = mayOpen && wish;
+  const opens = opened || beginning?.opened !== undefined;
+  const every = useAllBreakpoints(marks.data, graph, seq, opens, beginning?.opened);
   const roles = useMemo(
     () => rolesIn(opened ? [...own, ...actionsInside(graphs)] : own),
     [own, opened, graphs],
@@ -338,8 +320,10 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const people = Object.fromEntries(roles.map((role) => [role, answering?.[role] ?? ""]));
   const needsNone = actors.length === 0 && asks && graphs !== null;
   const missing = led && !needsNone ? castObstacle(actors, cast) : null;
-  const way = { text, marked, marks, actors, several, led, want, offered };
-  const levels = { mayOpen, opened, unheld, setOpens };
+  const wrong = text.error ?? marks.error ?? every.error;
+  const { breakpoints } = every;
+  const way = { text, wrong, breakpoints, actors, several, led, want, offered };
+  const levels = { mayOpen, opened, setOpens };
   return { ...way, ...levels, cast, pick, lost, setLost, missing, roles, people, setAnswering };
 }
 
@@ -371,7 +355,7 @@ export function StartDialog(props: Props) {
   const watch = useWatching(engines);
   const mayDrill = !led && engines.length === 1 && !engines.includes(SIMULATOR);
   const [drills, setDrills] = useState(false);
-  const breakpoints = way.marks.data;
+  const { breakpoints } = way;
   const { from, ...begins } = useStartFrom(
     beginning,
     `${textScope(graph, person.id)}continue/${beginning?.run ?? ""}`,
@@ -382,7 +366,7 @@ export function StartDialog(props: Props) {
   const values = beginning?.at.length === 0 ? (props.values ?? {}) : given.values;
   const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints, values, from };
   const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
-  const error = way.text.error ?? way.marks.error ?? way.marked.error ?? given.error ?? lookError;
+  const error = way.wrong ?? given.error ?? lookError;
   const start = useStart(graph);
   const mayMove = engines.some((engine) => engine !== SIMULATOR);
   const repeats = useRepeatChoice(given.asked, mayMove, `${textScope(graph, person.id)}repeat`);
@@ -399,7 +383,6 @@ export function StartDialog(props: Props) {
       : start.isPending || open.isPending
         ? "Starting …"
         : (way.missing ??
-          way.unheld ??
           given.obstacle ??
           watch.obstacle ??
           begins.obstacle(earlier) ??
@@ -430,9 +413,8 @@ export function StartDialog(props: Props) {
       : asked.length > 1
         ? "One robot, or a led run, can wait"
         : (way.missing ??
-          way.unheld ??
           given.obstacle ??
-          (look.isPlaceholderData ? "Looking …" : null));
+          (look.isPlaceholderData || breakpoints === undefined ? "Looking …" : null));
   const begin = () => {
     rememberEngines(graph, asked);
     if (order !== null) rememberLed(graph, order);
@@ -504,17 +486,11 @@ export function StartDialog(props: Props) {
       {way.mayOpen && (
         <LevelsChoice
           opened={way.opened}
-          marked={way.marked.data ?? []}
           onOpened={(opened) => {
             setReason("");
             way.setOpens(opened);
           }}
         />
-      )}
-      {!way.mayOpen && (way.marked.data?.length ?? 0) > 0 && (
-        <Text size="sm" className="ink-warn" role="alert">
-          {marksInsideWords(way.marked.data ?? [], true)}
-        </Text>
       )}
       {way.roles.length > 0 && (
         <PeopleChoice roles={way.roles} people={way.people} onPeople={way.setAnswering} />

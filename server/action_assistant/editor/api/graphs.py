@@ -331,15 +331,17 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @get(
         "/api/graphs/{graph_id:str}/breakpoints",
-        summary="Where led runs of a graph wait, as a start of it after its change `at` names that",
+        summary="Where led runs of a graph wait, as a start of it after its change `at` names that; with "
+        "`inside` also in the graphs inside, as they are now, for a start that opens them",
         operation_id="getBreakpoints",
         guards=[Needs("see")],
     )
-    async def get_breakpoints(graph_id: str, at: SeqOrNone = None) -> list[Breakpoint]:
+    async def get_breakpoints(
+        graph_id: str, at: SeqOrNone = None, *, inside: bool = False
+    ) -> list[Breakpoint]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        sight = await services.graph_reader.moment(graph_id, at)
-        return list(await services.graph_reader.ask(contents.breakpoints, sight))
+        return await services.versions.breakpoints(graph_id, at, inside=inside)
 
     @post(
         "/api/graphs/{graph_id:str}/rewriting",

@@ -10,6 +10,7 @@ from action_assistant.editor.api.graphs import SeqOrNone
 from action_assistant.editor.catalogue.versions import InsideView, VersionView
 from action_assistant.editor.interchange.subgraphs import zipped
 from action_assistant.editor.services import EditorState
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.graph_seals import Sight
 from action_assistant.web.auth.keys import PersonRef
@@ -99,6 +100,16 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         )
 
     @get(
+        "/api/versions/{version_id:str}/breakpoints",
+        summary="Where led runs of a version wait, as a start of it names that: in its graph as that was "
+        "then, and in the graphs inside, as they are now, for a start that opens them",
+        operation_id="getVersionBreakpoints",
+        guards=[Needs("see")],
+    )
+    async def get_version_breakpoints(version_id: str) -> list[Breakpoint]:
+        return await app_state.services.versions.breakpoints_of(version_id)
+
+    @get(
         "/api/versions/{version_id:str}",
         summary="One version with its UMRF",
         operation_id="getVersion",
@@ -144,5 +155,5 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     return [
         *(list_versions, publish_version, get_subgraphs, download_subgraphs),
-        *(get_version, get_sight, release, withdraw),
+        *(get_version, get_version_breakpoints, get_sight, release, withdraw),
     ]

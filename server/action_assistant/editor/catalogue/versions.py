@@ -23,6 +23,7 @@ from action_assistant.errors import (
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.run_size import MOST_ACTIONS, MOST_INSIDE, excess
@@ -231,6 +232,30 @@ class Versions:
         )
         digests = found.digest, found.tree_digest
         return InsideView(sight.seq, *digests, graphs, inside.several, inside.cut)
+
+    async def breakpoints(
+        self, graph: str, seq: int | None, *, inside: bool = False
+    ) -> list[Breakpoint]:
+        """Return the breakpoints of a graph at its change `seq` (None: the newest), as a start names them;
+        with `inside` also those of the graphs inside, of now. Raise as `inside` does."""
+        sight = await self._graph_reader.moment(graph, seq)
+        within = (await self._checks.inside(sight)).graphs if inside else ()
+        own = await self._graph_reader.ask(contents.breakpoints, sight)
+        return [*own, *[each for one in within for each in await self._inner(*one)]]
+
+    async def breakpoints_of(self, version: str) -> list[Breakpoint]:
+        """Return the breakpoints of the graph of a version at its moment, as a start names them, and those
+        of the graphs that it has pinned, of now: also of deleted ones. Raise NotFound for an unknown
+        version, Forbidden if the person may not see a graph inside."""
+        row, published = await self._published(version)
+        found = await self.breakpoints(row.graph, row.seq)
+        for each in published.subgraphs:
+            found += await self._inner(each.name, await self._graph_reader.now(each.graph))
+        return found
+
+    async def _inner(self, name: str, sight: contents.GraphAtSeq) -> list[Breakpoint]:
+        own = await self._graph_reader.ask(contents.breakpoints, sight)
+        return [msgspec.structs.replace(each, inside=name) for each in own]
 
     async def get(self, version: str) -> VersionView:
         """Return one version with its UMRF and its pinned sub-graphs. Raise NotFound if there is

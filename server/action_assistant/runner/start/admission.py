@@ -31,7 +31,7 @@ from action_assistant.runner.start.casting import (
     require_same_robots,
     without_preset,
 )
-from action_assistant.runner.start.levels import opened_levels, pinned_in
+from action_assistant.runner.start.levels import opened_levels, pinned_in, pinned_opened
 from action_assistant.runner.start.piece_texts import PieceText, texts_of
 from action_assistant.runner.start.start_from import Beginning, EarlierRun, beginning
 from action_assistant.umrf.breakpoints import Breakpoint
@@ -310,8 +310,8 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
     `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one; `handing`:
     the arrows by which these hand values to others. `digest`, `tree_digest`: of the version;
-    `sent_digest`, `beyond`, `beginning`, `levels`: as of `Admitted`, `beginning` without its graph. `limits`: those
-    in force on its robots, to which all of it was held; `over`: what is outside of them."""
+    `sent_digest`, `beyond`, `beginning`, `levels`: as of `Admitted`, `beginning` without its graph.
+    `limits`: those in force on its robots; `over`: what is outside of them."""
 
     run: str
     name: str
@@ -370,10 +370,10 @@ def admit(
     earlier: EarlierRun | None = None,
 ) -> Admitted:
     """Check the graphs of a start request, and return them as read. If the start is not `approved`,
-    its digests may be missing. `earlier`: the run from which it takes outcomes. Raise NotUmrf if a text is no UMRF graph, Conflict if a digest
-    differs or a problem forbids the start, TooLarge if the graphs are too large, BadInput for
-    another fault of the request. Except for its size, a graph is refused only for problems that its
-    checks show too."""
+    its digests may be missing. `earlier`: the run from which it takes outcomes. Raise NotUmrf if a text
+    is no UMRF graph, Conflict if a digest differs or a problem forbids the start, TooLarge if the graphs
+    are too large, BadInput for another fault. Except for its size, a graph is refused only for problems
+    that its checks show too."""
     text, reading = read_sent(bytes(request.umrf))
     stamp = codec.stamp_of(text)
     found = digest(reading.graph)
@@ -576,8 +576,7 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     before the start and never sent. `problems`: what leading the graph means; `remedies`: what
     would take a problem away, by its code, as a sentence; `breakpoints`: where the run will wait;
     `robots`, `people`: those of the request that the graph needs, by actor; `asked`: the actions that
-    people answer, or for which the runner waits.
-    """
+    people answer, or for which the runner waits."""
 
     whole: Prepared
     players: dict[str, str]
@@ -618,7 +617,12 @@ def prepared_pieces(
     if whole.beginning is not None and whole.beginning.before is not None:
         require_same_robots(request.robots, earlier)
     skipped = whole.beginning.earlier.skipped if whole.beginning is not None else ()
-    breakpoints = pinned_in(graph, request.breakpoints, skipped=skipped, levels=whole.levels)
+    if whole.levels is None:
+        breakpoints = pinned_in(graph, request.breakpoints, skipped=skipped)
+    else:
+        closed = _given(read_sent(bytes(request.umrf))[1].graph, request.values)
+        opens = closed, graphs_in(whole.subgraphs), whole.levels
+        breakpoints = pinned_opened(graph, request.breakpoints, *opens)
     hindering = (
         *obstacles_of_questions(inside),
         *subgraph_obstacles(for_robots, inside, request.robots),

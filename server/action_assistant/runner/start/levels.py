@@ -1,6 +1,7 @@
 """The opened sub-graphs of a led start, and the places of its breakpoints. Pure."""
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import Final
 
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.umrf.breakpoints import Breakpoint, NoSuchPlace, pinned
@@ -8,11 +9,12 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.hierarchy.opening import (
     CannotOpen,
     Levels,
-    OpenedGraph,
     opened,
     opened_breakpoints,
 )
 from action_assistant.umrf.model import Graph
+
+_BREAKPOINTS: Final[dict[str, object]] = {"path": "/breakpoints"}
 
 
 def opened_levels(
@@ -35,23 +37,43 @@ def opened_levels(
     return found.graph, found.levels
 
 
-def pinned_in(
+def pinned_opened(
     graph: Graph,
     breakpoints: Sequence[Breakpoint],
-    *,
-    skipped: Collection[str] = (),
-    levels: Mapping[str, Levels] | None = None,
+    version: Graph,
+    inside: Mapping[str, Graph],
+    levels: Mapping[str, Levels],
+) -> tuple[Breakpoint, ...]:
+    """Return the breakpoints for a run of an opened graph (`graph`, with the sub-graphs around each of its
+    actions in `levels`). `version`: the graph with its sub-graphs closed, `inside` these by name. Raise
+    BadInput for a breakpoint that has no place there, Conflict if the sub-graphs would be opened in another
+    way today, so that nobody can say where one stands."""
+    if not breakpoints:
+        return ()
+    try:
+        found = opened(version, inside)
+    except CannotOpen:
+        found = None
+    if found is None or found.levels != levels:
+        text = "The sub-graphs of that run are opened in another way today. Start it without breakpoints."
+        raise Conflict(text, where=_BREAKPOINTS)
+    try:
+        return pinned(graph, opened_breakpoints(found, breakpoints, inside))
+    except NoSuchPlace as why:
+        raise BadInput(str(why), where=_BREAKPOINTS) from why
+
+
+def pinned_in(
+    graph: Graph, breakpoints: Sequence[Breakpoint], *, skipped: Collection[str] = ()
 ) -> tuple[Breakpoint, ...]:
     """Return the breakpoints for a run of a graph. `skipped`: actions that the run leaves out, so that
-    nobody waits there; `levels`: of a graph whose sub-graphs are opened. Raise BadInput for a breakpoint
-    that has no place there."""
-    wanted = tuple(each for each in breakpoints if not {each.action, each.to} & set(skipped))
+    nobody waits there. Raise BadInput for a breakpoint that has no place there."""
+    gone = set(skipped)
+    wanted = (each for each in breakpoints if each.inside or not {each.action, each.to} & gone)
     try:
-        if levels is not None and not skipped:
-            wanted = opened_breakpoints(OpenedGraph(graph, dict(levels)), wanted)
         return pinned(graph, wanted)
     except NoSuchPlace as why:
-        raise BadInput(str(why), where={"path": "/breakpoints"}) from why
+        raise BadInput(str(why), where=_BREAKPOINTS) from why
 
 
 def pinned_for_text(umrf: str, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:

@@ -667,7 +667,11 @@ def breakpoint_items(breakpoints: Sequence[Breakpoint], *, is_led: bool) -> tupl
         return ()
     number = counted(len(breakpoints), "breakpoint")
     if is_led:
-        return (Item(code="breakpoints", verdict="passed", text=f"The run waits at {number}."),)
+        inner = [each.inside for each in breakpoints if each.inside]
+        more = f", {len(inner)} of them inside of {_listed(sorted(set(inner)))}" if inner else ""
+        return (
+            Item(code="breakpoints", verdict="passed", text=f"The run waits at {number}{more}."),
+        )
     text = f"The whole graph is handed over at once: {number} of it will hold nothing."
     return (Item(code="breakpoints", verdict="warned", text=text),)
 
