@@ -5,8 +5,9 @@ import type { RunBreakpoint } from "../graph/breakpoints";
 import { newAid } from "../graph/document-keys";
 import { isolated } from "../words/isolated";
 import { editor, runnerAt } from "./client";
-import { isOutcomeUnknown } from "./http";
+import { isOutcomeUnknown, pathRefused } from "./http";
 import { enginesOf, type LedOrder } from "./led-runs";
+import { lostPresses } from "./lost-presses";
 import { getRun, type Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
@@ -220,27 +221,26 @@ export function useRun(runner: string | undefined, id: string) {
   });
 }
 
-/** Request ids of presses whose answers got lost, by what was pressed. */
-const unanswered = new Map<string, string>();
-
 /**
  * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
- * thing is sent with the same id, so that the two count once: also one after a press that was refused
- * meanwhile, since the first may still be carried out.
+ * thing is sent with the same id, so that the two count once: also after the page was loaded anew, and also one
+ * after a press that was refused meanwhile, since the first may still be carried out. Where the id itself is
+ * refused, the first was carried out and is over.
  */
 export async function sendPress<T>(
   what: string,
   send: (request: string) => Promise<T>,
 ): Promise<T> {
-  const lost = unanswered.get(what);
+  const lost = lostPresses.get(what);
   const request = lost ?? newAid();
-  unanswered.set(what, request);
+  lostPresses.keep(what, request);
   try {
     const answer = await send(request);
-    unanswered.delete(what);
+    lostPresses.forget(what);
     return answer;
   } catch (error) {
-    if (lost === undefined && !isOutcomeUnknown(error)) unanswered.delete(what);
+    const isOver = lost === undefined || pathRefused(error).endsWith("/request_id");
+    if (isOver && !isOutcomeUnknown(error)) lostPresses.forget(what);
     throw error;
   }
 }

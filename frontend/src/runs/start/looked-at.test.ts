@@ -1,4 +1,4 @@
-import { expect, test } from "vitest";
+import { expect, test, vi } from "vitest";
 import { Refusal } from "../../api/http";
 import type { StartOrder } from "../../api/runs";
 import { sendLookedAt } from "./looked-at";
@@ -21,8 +21,13 @@ async function pressed(of: LookedAtOrder, answer: () => Promise<string>) {
 }
 
 const lost = () => Promise.reject(new TypeError("Failed to fetch"));
-const refused = () =>
-  Promise.reject(new Refusal({ type: "conflict", title: "No", status: 409, detail: "No." }));
+const refused = (path?: string, kind = Refusal) =>
+  Promise.reject(
+    new kind({
+      ...{ type: "conflict", title: "No", status: 409, detail: "No." },
+      ...(path === undefined ? {} : { where: { path } }),
+    }),
+  );
 
 test("a press whose answer got lost has the same request id when it is made again, and another one its own", async () => {
   const first = await pressed(order, lost);
@@ -31,8 +36,43 @@ test("a press whose answer got lost has the same request id when it is made agai
   const again = await pressed(order, () => Promise.resolve("there"));
   expect([again.request, again.end]).toEqual([first.request, "there"]);
   expect(other.request).not.toBe(first.request);
-  const next = await pressed(order, refused);
+  const next = await pressed(order, () => refused());
   expect(next.end).toBe("Refusal");
   expect(next.request).not.toBe(first.request);
-  expect((await pressed(order, refused)).request).not.toBe(next.request);
+  expect((await pressed(order, () => refused())).request).not.toBe(next.request);
+});
+
+test("a press whose answer got lost has the same request id after the page was loaded again, until it is over", async () => {
+  const kept = new Map<string, string>();
+  const sessionStorage = {
+    getItem: (key: string) => kept.get(key) ?? null,
+    setItem: (key: string, text: string) => void kept.set(key, text),
+  };
+  vi.stubGlobal("window", { sessionStorage });
+  /** Loads the page again, and presses. */
+  async function loaded(answer: (kind: typeof Refusal) => Promise<string>): Promise<string> {
+    vi.resetModules();
+    const page = await import("./looked-at");
+    const http = await import("../../api/http");
+    let request = "";
+    const send = (each: StartOrder) => {
+      request = each.request;
+      return answer(http.Refusal);
+    };
+    const whole = { ...order, inside: { subgraphs: [], tree_digest: "t" } };
+    await page.sendLookedAt("queue", whole, send).catch(() => undefined);
+    return request;
+  }
+  const first = await loaded(lost);
+  expect(await loaded(lost)).toBe(first);
+  expect(await loaded((kind) => refused("/start", kind))).toBe(first); // the first may still be carried out
+  expect(await loaded((kind) => refused("/start/request_id", kind))).toBe(first);
+  const next = await loaded(() => Promise.resolve("there"));
+  expect(next).not.toBe(first);
+  expect(await loaded(() => Promise.resolve("there"))).not.toBe(next);
+  for (const damaged of ["{", "7", '[["a"], 1, ["queue", 2]]']) {
+    kept.set("aa.presses", damaged);
+    expect(await loaded(() => Promise.resolve("there"))).not.toBe("");
+  }
+  vi.unstubAllGlobals();
 });

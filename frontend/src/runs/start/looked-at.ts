@@ -8,9 +8,9 @@ import { type LookedAtOrder, notifyFailure } from "./use-start";
 /** An error of a request whose outcome nobody knows: the message stays until a person closes it. */
 class NotKnown extends Error {}
 
-/** Return a name of a press of what was looked at: the same for the same. */
-export function pressOf(what: string, { umrf: _, ...named }: LookedAtOrder): string {
-  return `${what} ${JSON.stringify(named)}`;
+/** Return a name of a press of what was looked at: the same for the same. Digests stand for the graphs. */
+export function pressOf(what: string, { umrf: _, inside, ...named }: LookedAtOrder): string {
+  return `${what} ${JSON.stringify({ ...named, tree: inside?.tree_digest })}`;
 }
 
 /**
