@@ -66,7 +66,7 @@ export interface DryRun {
   readonly given: GivenValues | null;
   /** The moment of a run from which it starts; null: from its own start. */
   readonly seed: DryRunSeed | null;
-  /** Where it begins, if not at the entry. */
+  /** The part with which it begins; null: with the entry. */
   readonly part: DryRunPart | null;
   /** Facts of that moment that are unknown, or that the rules do not reach. */
   readonly doubts: readonly SeedDoubt[];

@@ -134,7 +134,7 @@ function useStartEntry(entry: QueueEntry) {
 
 interface BeginProps {
   entry: QueueEntry;
-  /** Why it cannot be started now; null when it can. */
+  /** The reason why it cannot be started now; null when it can. */
   obstacle: string | null;
   isPending: boolean;
   onStart: () => void;

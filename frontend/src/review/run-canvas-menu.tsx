@@ -1,4 +1,4 @@
-/** What people can do at one action or arrow of a run, where they ask for it on its canvas. */
+/** The menu of one action or arrow on the canvas of a run. */
 import { Button, Popover } from "@mantine/core";
 import { useWindowEvent } from "@mantine/hooks";
 import { IconPlayerSkipForward } from "@tabler/icons-react";

@@ -39,7 +39,7 @@ function restWords(rest: Rest, moment: (at: number | null) => string): string {
   return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 
-/** What other programs recorded of the run on each robot, such as a video, at the moment that is shown. */
+/** Links to recordings by other programs, such as videos, of each robot at the moment that is shown. */
 function Recorded({ run, at }: Pick<Props, "run" | "at">) {
   const links = useRunLinks();
   const addresses = links.flatMap(({ name, url }) =>

@@ -1,4 +1,4 @@
-/** What mends a look before a start on the spot: the baton, a second person's yes, a confirmation. */
+/** The buttons beside a look before a start for what it lacks: the baton, a second person's yes, a confirmation. */
 import { Button, Text } from "@mantine/core";
 import { IconSend, IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";

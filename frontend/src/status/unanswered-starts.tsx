@@ -126,7 +126,7 @@ export interface SentStart {
   /** The graph that was sent, in words: "v3 of patrol". */
   what: string;
   engines: readonly string[];
-  /** What it does if it arrives, and what to know until that is seen, if it is sent to wait and not to start. */
+  /** The effect of its arrival, and the hint until that is seen, if it is sent to wait and not to start. */
   does?: string;
   hint?: string;
   /** Time at which it was sent, ms. */

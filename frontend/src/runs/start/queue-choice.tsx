@@ -19,7 +19,7 @@ import { notifyFailure, type StartInput, useOrder, versionWords } from "./use-st
 const PASSING: ReadonlySet<string> = new Set([
   ...["free", "again", "quiet", "rest", "baton", "confirm", "watched", "present", "approved"],
 ]);
-/** Of these, those that say that something goes on there. */
+/** The checks that say that something goes on at the robot. */
 const BUSY: ReadonlySet<string> = new Set(["free", "quiet"]);
 
 const blockedIn = (looks: readonly Preflight[] | undefined) =>
@@ -93,7 +93,7 @@ interface Props {
   looks: readonly Preflight[] | undefined;
   /** The robots of the start. */
   robots: readonly string[];
-  /** Why this start is none that waits; null for one that may. */
+  /** The reason why this start cannot wait; null when it can. */
   obstacle: string | null;
   /** The reason of the person to start in spite of checks. */
   reason: string;
