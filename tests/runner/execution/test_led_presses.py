@@ -1,7 +1,7 @@
 """*Go on* and an outcome by word count once for each press, also if its answer is lost and it is sent
 again."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Literal
 
@@ -24,7 +24,7 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import microseconds, time
-from action_assistant.runner.start.admission import GoOnRequest, WordRequest
+from action_assistant.runner.start.admission import GoOnRequest, WaitRequest, WordRequest
 from runner.execution.test_conductor import Lab, led, shared
 from runner.harness import (
     ANN,
@@ -34,6 +34,7 @@ from runner.harness import (
     ended,
     engine,
     run_in_virtual_time,
+    stand_still,
     until,
     virtual,
 )
@@ -148,6 +149,76 @@ async def test_a_refused_go_on_has_not_counted_and_is_looked_at_anew() -> None:
         await anyio.sleep(5)
         assert (await control.go_on(run, press, BEN)).held is None
         assert await ended(control, run) == "finished"
+
+
+async def refused_meanwhile(
+    lab: Lab, control: ExecutionService, run: str, happens: Callable[[], Awaitable[object]]
+) -> Held:
+    """Press *Go on* while the robot takes a while to answer, and let something happen meanwhile; return the
+    reason for which the run is held then."""
+    since = hold(control, run)
+    lab.david.old = 1.5
+    refusals: list[str] = []
+
+    async def press() -> None:
+        try:
+            await control.go_on(run, GoOnRequest(since, request_id="go"), BEN)
+        except Conflict as why:
+            refusals.append(why.detail)
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(press)
+        await anyio.sleep(0.05)
+        await happens()
+    assert [why for why in refusals if "another reason to wait" in why], refusals
+    held = control.open[run].run.held
+    assert held is not None
+    return held
+
+
+@virtual
+async def test_a_wait_that_is_pressed_while_go_on_asks_the_robots_counts() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        waiting = WaitRequest(request_id="wait", reason="somebody walks in")
+        held = await refused_meanwhile(lab, control, run, lambda: control.wait(run, waiting, ANN))
+        told = [each for each in lab.harness.journal.told(run) if isinstance(each, Held)]
+        assert (told[-1].by, told[-1].reason) == (ANN, "somebody walks in")
+        assert held.why == f"A robot was lost. {ANN.name} made it wait: somebody walks in"
+        assert held.how == "trouble", "whoever lets it go on has seen both"
+        await anyio.sleep(30)
+        assert lab.carol.starts == []
+        await control.wait(run, waiting, ANN)
+        assert control.open[run].run.held == held, "a repeated press changes nothing"
+
+
+@virtual
+async def test_a_runner_that_stands_still_while_go_on_asks_the_robots_lets_nothing_begin() -> None:
+    async def stands_still() -> None:
+        stand_still(6)
+
+    lab = Lab({"*": [{"after_s": 20}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        held = await refused_meanwhile(lab, control, run, stands_still)
+        assert "stood still" in held.why
+        await anyio.sleep(30)
+        assert lab.carol.starts == []
+
+
+@virtual
+async def test_the_same_reason_again_refuses_no_go_on() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        since = hold(control, run)
+        lab.david.old = 0.5
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(control.go_on, run, GoOnRequest(since, request_id="go"), BEN)
+            await anyio.sleep(0.05)
+            assert hold(control, run) == since
+        assert control.open[run].run.held is None
 
 
 @virtual

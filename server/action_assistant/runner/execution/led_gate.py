@@ -44,6 +44,7 @@ from action_assistant.web.auth.identity import Identity
 
 #: Reasons that replace another one: whoever lets the run go on has seen the most serious.
 _RANK: Final[Mapping[HeldHow, int]] = {"wait": 0, "step": 0, "breakpoint": 1, "trouble": 2}
+_LONGEST_WHY: Final = 1_000  # characters of earlier reasons, before the newest
 
 
 class LedGate(Gate):
@@ -76,6 +77,7 @@ class LedGate(Gate):
         self._registry = robots
         self._clock_us = clock_us
         self._tell = tell
+        self._reasons: set[str] = set()  # for which it is held now
         self._ready: dict[int, Step] = {}  # the steps that wait before the gate, by call
         self._noted: set[int] = set()  # those of which that is recorded
         self._let: Step | None = None  # the only step that may pass, since a person let it
@@ -99,13 +101,13 @@ class LedGate(Gate):
     def hold_run(
         self, why: str, by: Author | None = None, *, how: HeldHow = "trouble", node: str = ""
     ) -> None:
-        """Hold the run and record that, unless it is stopped, or held already for a reason that is as
-        serious. A fault, or a breakpoint, is recorded also where a person made the run wait, so that
-        whoever lets it go on has seen it. `by`: None for the runner; `node`: as in `Held`."""
+        """Hold the run and record that, unless it is stopped. If it is held already for a reason that is
+        as serious, add this one to it, unless it says that already: whoever lets it go on has seen all
+        of them. `by`: None for the runner; `node`: as in `Held`."""
         self._hold(Held(at=self._clock_us(), why=why, by=by, how=how, node=node))
 
     def wait_for_person(self, by: Author, reason: str, request_id: str) -> None:
-        """Hold the run before its next action, since a person wants that; do nothing if it is held.
+        """Hold the run before its next action, since a person wants that; as `hold_run` if it is held.
         `reason`: given by the person, may be ""; `request_id`: the request id of the press."""
         why = f"{by.name} made it wait: {reason}" if reason else f"{by.name} made it wait."
         now = self._clock_us()
@@ -113,9 +115,15 @@ class LedGate(Gate):
         self._hold(held, by.id)
 
     def _hold(self, held: Held, author: str = "") -> None:
-        is_known = self.held is not None and _RANK[self.held.how] >= _RANK[held.how]
-        if self.is_final or is_known:
+        known = self.held
+        self._reasons = self._reasons if known is not None else set()
+        if self.is_final or held.why in self._reasons:
             return
+        self._reasons.add(held.why)
+        if known is not None and _RANK[known.how] >= _RANK[held.how]:
+            why = f"{known.why[:_LONGEST_WHY]} {held.why}"
+            by = held.by or known.by
+            held = replace(held, how=known.how, why=why, by=by, node=known.node)
         self.hold(held)
         self.on_hold()
         self._let, self._let_by, self._limit = None, None, UNLIMITED
@@ -300,7 +308,8 @@ class LedGate(Gate):
         claim = replace(self.claim, watching=frozenset(press.watching))
         await self._look.before_going_on(self._registry, names, self._first, lead, claim)
         if held is None or self.held is not held or self.is_final:
-            raise Conflict("The run has gone on, or was stopped, meanwhile.")
+            text = "The run has gone on, was stopped, or has another reason to wait meanwhile. Look at it first."
+            raise Conflict(text)
         if step is not self._next(press.limit):
             raise Conflict("Another action waits to begin than before. Look at it first.")
         for name in sorted(self.robots):  # in the step in which the gate opens
