@@ -4,6 +4,7 @@ import json
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import httpx
 import msgspec
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 from action_assistant.errors import BadInput, Conflict, TooMany
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import SIMULATOR, Order, Registration
+from action_assistant.runner.links.port import SIMULATOR, Leaves, Order, Registration, unwatched
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.start.approvals import (
     STREAM,
@@ -22,8 +23,11 @@ from action_assistant.runner.start.approvals import (
     ApprovalRequest,
     Approvals,
 )
+from action_assistant.runner.start.orders import order_of
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.facts import BadProfile, facts_of
 from action_assistant.web.auth.caller import Caller, set_caller
+from runner.execution.test_conductor import shared
 from runner.harness import ANN, BEN, Harness, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, change, fleet, group, verdicts
 from support.product import TOKEN, running
@@ -87,13 +91,38 @@ async def test_a_yes_is_to_exactly_one_graph() -> None:
     assert david.starts == []
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"script": {"*": [{"result": "on_false"}]}},
+        {"breakpoints": ()},
+        {"lost": "wait"},
+        {"robots": {"Scout": "simulator", "Carrier": "David"}},
+    ],
+    ids=lambda change: "+".join(change),
+)
+def test_a_yes_is_to_the_whole_order_of_a_led_run(change: dict[str, Any]) -> None:
+    graph = shared(sequence("task", 2), "Scout", "Carrier")
+    whole: dict[str, Any] = {
+        "engine": "conducted",
+        "robots": {"Scout": "simulator", "Carrier": "Carol"},
+        "script": {"*": [{"result": "on_true"}]},
+        "breakpoints": (Breakpoint(action="Work_1"),),
+    }
+    one, other = order(graph, **whole), order(graph, **(whole | change))
+    assert order_of(one, one.digest, (), {}) != order_of(other, one.digest, (), {})
+    assert order_of(one, one.digest, (), {}) == order_of(order(graph, **whole), one.digest, (), {})
+
+
 @virtual
 async def test_a_change_of_what_runs_is_asked_for_like_a_start() -> None:
     class Pausing(Open):
         pauses = True
         modified: tuple[Order, ...] = ()
 
-        async def modify(self, order: Order, continue_from: str = "") -> None:
+        async def modify(
+            self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+        ) -> None:
             """Remember the order instead of sending it."""
             self.modified = (*self.modified, order)
 

@@ -45,14 +45,17 @@ def order_of(
     request: StartRequest, tree_digest: str, codes: Collection[str], limits: Limits
 ) -> str:
     """Return the digest of everything that a second person says yes to: the version (`tree_digest`), and
-    where there are any, the values, the robots of a led run with what happens when one is lost, the
-    overridden `codes`, the `limits` in force on its robots, that its sub-graphs are opened, and where it
-    begins: the record of an earlier run, which is over, does not change. That of a start with nothing besides its graph is the tree digest."""
+    where there are any, the values, the robots of a led run with what happens when one is lost and the
+    script of what the simulator plays in it, the overridden `codes`, the `limits` in force on its robots,
+    its breakpoints, that its sub-graphs are opened, and where it begins: the record of an earlier run,
+    which is over, does not change. That of a start with nothing besides its graph is the tree digest."""
     more: dict[str, Any] = {}
     if request.values:
         more["values"] = msgspec.to_builtins(request.values)
     if request.engine == CONDUCTED:
         more |= {"robots": request.robots, "lost": request.lost}
+    if request.engine == CONDUCTED and SIMULATOR in request.robots.values() and request.script:
+        more["script"] = bytes(request.script).decode()
     if request.people:
         more["people"] = request.people
     if codes:
@@ -61,6 +64,8 @@ def order_of(
         more["limits"] = msgspec.to_builtins(limits)
     if request.start_from is not None:
         more["from"] = msgspec.to_builtins(request.start_from)
+    if request.breakpoints:
+        more["breakpoints"] = msgspec.to_builtins(request.breakpoints)
     if request.levels != "one_step":
         more["levels"] = request.levels
     if not more:
