@@ -37,7 +37,7 @@ _OF_THE_MOMENT: Final = frozenset(
 #: Of these, those that may be missing when a queue is opened: nothing starts by that.
 _AT_THE_START: Final = frozenset({"free", "confirm", "watched", "present", "approved"})
 #: Figures change by themselves between two looks: ages, levels of a battery.
-_FIGURE: Final = re.compile(r"\d+([.,]\d+)*")
+_FIGURE: Final = re.compile(r"(?<!\w)\d+([.,]\d+)*")  # no part of a name
 _WORSE: Final = {"passed": 0, "warned": 1, "blocked": 2}
 
 _Id = Annotated[str, msgspec.Meta(max_length=100)]
