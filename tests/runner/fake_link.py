@@ -90,12 +90,16 @@ class FakeLink:
         message = Pause(graph_name=graph_name, targets=(self._name,))
         await self._network.outlets.pause.send(lambda: message)
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Publish one resume message."""
         message = Resume(graph_name=graph_name, targets=(self._name,))
         await self._network.outlets.resume.send(lambda: message)
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Publish one modify message."""
         message = Modify(
             graph_name=order.graph.name,

@@ -298,13 +298,17 @@ class Robot:
         """The standing of the simulated engine."""
         return msgspec.structs.replace(self.engine.standing, indexes=self.indexes)
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Let the engine obey a change."""
-        await self.engine.modify(order, continue_from)
+        await self.engine.modify(order, continue_from, leaves)
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Let a resume message arrive."""
-        await self.engine.resume(graph_name, continue_from)
+        await self.engine.resume(graph_name, continue_from, leaves)
 
     async def get(self) -> Answer:
         """May be lost, like any message; may be old when it comes."""

@@ -194,10 +194,14 @@ class Recording:
     async def pause(self, graph_name: str) -> None:
         """Do nothing: recordings have no pause."""
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Do nothing: recordings have no resume."""
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Do nothing: recordings have no modify."""
 
     async def aclose(self) -> None:

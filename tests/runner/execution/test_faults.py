@@ -11,7 +11,7 @@ from action_assistant.errors import Conflict, Unavailable
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.monitor import Monitor
-from action_assistant.runner.links.port import Answer, NotSent, Order
+from action_assistant.runner.links.port import Answer, Leaves, NotSent, Order, unwatched
 from action_assistant.runner.review.background_loops import SumUpLoop
 from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.robots.recordings import Recordings
@@ -135,6 +135,41 @@ async def test_a_fault_in_what_watches_a_run_is_told_once_and_the_run_still_stop
         assert not await david.moving("patrol")
 
 
+class SlowToGoOn(Open):
+    """A robot on whose domain a message that lets a graph go on waits for its turn."""
+
+    pauses = True
+
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
+        """Let the message leave after a while."""
+        await anyio.sleep(0.15)
+        leaves()
+        self.resumed = True
+
+    resumed = False
+
+
+@virtual
+async def test_a_resume_that_waits_for_its_turn_does_not_leave_after_a_stop() -> None:
+    david = SlowToGoOn(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        await control.pause(run, ANN)
+
+        async def press() -> None:
+            with pytest.raises(Unavailable, match="being stopped"):
+                await control.resume(run, ANN)
+
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(press)
+            await anyio.sleep(0.02)
+            await control.stop(run, BEN)
+        assert not david.resumed
+
+
 def test_a_pause_that_cannot_be_sent_is_told_and_the_run_is_stopped_all_the_same() -> None:
     class Unsendable(Open):
         pauses = True
@@ -143,7 +178,9 @@ def test_a_pause_that_cannot_be_sent_is_told_and_the_run_is_stopped_all_the_same
             """Nobody is there to hand it to."""
             raise NotSent("nobody listens")
 
-        async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        async def resume(
+            self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+        ) -> None:
             """Fail, since nobody listens."""
             raise NotSent("nobody listens")
 

@@ -10,7 +10,15 @@ import pytest
 from action_assistant.errors import Conflict, OutcomeUnknown, Refused
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Answer, EngineRefused, NoAnswer, NotSent, Order
+from action_assistant.runner.links.port import (
+    Answer,
+    EngineRefused,
+    Leaves,
+    NoAnswer,
+    NotSent,
+    Order,
+    unwatched,
+)
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, clock_us, order, sequence, until, virtual
@@ -48,7 +56,9 @@ def test_a_change_that_was_not_made_leaves_the_version_that_runs(why: Exception)
     class Refuses(Open):
         pauses = True
 
-        async def modify(self, order: Order, continue_from: str = "") -> None:
+        async def modify(
+            self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+        ) -> None:
             """Fail with the given error."""
             raise why
 
@@ -122,7 +132,9 @@ class Changes(Open):
     is_asked = False
     fault: Exception | None = None
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Show the new graph from now on."""
         if self.fault is not None:
             raise self.fault

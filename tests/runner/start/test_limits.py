@@ -8,7 +8,7 @@ import pytest
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Order, Registration
+from action_assistant.runner.links.port import Leaves, Order, Registration, unwatched
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.start.approvals import ApprovalRequest
@@ -145,7 +145,9 @@ def test_a_change_to_a_graph_that_only_the_robot_has_cannot_be_held_to_limits() 
     class Changing(Pausing):
         sent = 0
 
-        async def modify(self, order: Order, continue_from: str = "") -> None:
+        async def modify(
+            self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+        ) -> None:
             """Count what leaves."""
             self.sent += 1
 

@@ -12,7 +12,7 @@ import pytest
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
-from action_assistant.runner.links.port import Order
+from action_assistant.runner.links.port import Leaves, Order, unwatched
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
@@ -196,7 +196,9 @@ def test_a_change_with_a_sub_graph_in_it_is_not_sent() -> None:
         pauses = True
         sent = 0
 
-        async def modify(self, order: Order, continue_from: str = "") -> None:
+        async def modify(
+            self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+        ) -> None:
             """Fail the test: this must not be called."""
             self.sent += 1
 

@@ -6,12 +6,13 @@ from typing import Annotated, Final
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict, Unavailable
+from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.port import (
     SIMULATOR,
     EngineRefused,
     GraphOutline,
+    Leaves,
     NotSent,
     Order,
 )
@@ -69,13 +70,16 @@ async def pause(opened: OpenRun, author: Author) -> Run:
     return opened.run
 
 
-async def resume(opened: OpenRun, author: Author, watching: tuple[str, ...]) -> Run:
-    """Let a paused run go on in the name of `author`, who watches these robots, and return it. Raise Conflict if the run is
-    not paused, Unavailable if the message could not be sent."""
+async def resume(
+    opened: OpenRun, author: Author, watching: tuple[str, ...], may_leave: Leaves
+) -> Run:
+    """Let a paused run go on in the name of `author`, who watches these robots, and return it.
+    `may_leave`: as for `OpenRun.resume`. Raise Conflict if the run is not paused, Unavailable if the
+    message could not be sent."""
     if opened.run.desired != "paused":
         raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
     try:
-        await opened.resume(author, watching)
+        await opened.resume(author, watching, may_leave)
     except NotSent as why:
         raise Unavailable(f"The resume could not be sent: {why}") from why
     return opened.run
@@ -137,10 +141,24 @@ async def modify(
     targets = () if run.simulated else (run.engine,)
     graph = GraphOutline(ready.name, ready.actions)
     message = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
-    require(msgspec.structs.replace(claim_of(start, ready), is_start=False))
+    require(claim := msgspec.structs.replace(claim_of(start, ready), is_start=False))
+
+    def may_leave() -> None:
+        try:
+            require(claim)
+        except Refused as why:
+            raise NotSent(why.detail) from why
+
     try:
         await opened.modify(
-            author, message, asked.version, ready.digest, asked.continue_from, watching, limits
+            author,
+            message,
+            asked.version,
+            ready.digest,
+            asked.continue_from,
+            watching,
+            limits,
+            may_leave,
         )
     except NotSent as why:
         raise Unavailable(f"The change could not be sent: {why}") from why

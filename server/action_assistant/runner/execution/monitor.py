@@ -83,8 +83,9 @@ class Monitor:
     the background.
 
     `trouble`: why the Stop of the run is not proven yet. `seen_at`: when the engine last showed the
-    run (µs UTC). `umrf`: the last graph that was sent, if known. `rested_at`: when the run was last
-    seen to be over, for a run that moves again. `exact`: the engine's answers show everything.
+    run (µs UTC). `is_elsewhere`: another process of the engine shows the run than the one that it was
+    sent to. `umrf`: the last graph that was sent, if known. `rested_at`: when the run was last seen to
+    be over, for a run that moves again. `exact`: the engine's answers show everything.
     """
 
     def __init__(
@@ -99,6 +100,7 @@ class Monitor:
     ) -> None:
         self.trouble = ""
         self.seen_at: int | None = None
+        self.is_elsewhere = False
         self.umrf: str | None = None
         self._clock_us = clock_us
         self._jobs: list[Job] = []
@@ -272,13 +274,12 @@ class Monitor:
         answer; `look`: the mark of the get that it answers."""
         run = changes.run
         name = run.graph_name
-        if len({run.incarnation, answer.incarnation} - {None, ""}) > 1:
-            if not run.lost:
-                changes.alarm("engine_restarted", "The engine was restarted: look at the robot.")
-                why = "The engine was restarted while the run went on."
-                changes.lose(why + changes.last_words())
-            return
         own = next((each for each in answer.graphs if each.graph == name), None)
+        is_other = len({run.incarnation, answer.incarnation} - {None, ""}) > 1
+        self.is_elsewhere = is_other and own is not None and own.run == run.id
+        if is_other:
+            self._lose_engine(changes)
+            return
         if own is None or own.run != run.id:
             if standing.doubt and standing.servers:
                 self._hear_nothing(changes, _NO_PROOF.format(doubt=standing.doubt))
@@ -303,6 +304,22 @@ class Monitor:
         else:
             self._loading.see(ours)
             self._conclude(changes, shown, ours, answer, look)
+
+    def _lose_engine(self, changes: RunChanges) -> None:
+        """Record that another process of the engine answers than the one that the run was sent to. If
+        that process shows the run, the start has reached it too, or alone: stops go on to it, but its
+        answers do not prove that the other one is at rest."""
+        if changes.run.lost:
+            return
+        alarm, why = (
+            "The engine was restarted: look at the robot.",
+            "The engine was restarted while the run went on.",
+        )
+        if self.is_elsewhere:
+            why = "Another process of the engine has the run than the one that it was sent to."
+            alarm = f"{why} {LOOK_AT_IT}"
+        changes.alarm("engine_restarted", alarm)
+        changes.lose(why + changes.last_words())
 
     def _compare(self, run: Run, answer: Answer, order: int) -> None:
         """Queue one comparison of the engine's graph text in an answer with the text that was sent,

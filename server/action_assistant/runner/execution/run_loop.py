@@ -176,12 +176,14 @@ class OpenRun:
         await self._link.pause(self.run.graph_name)
         self.look()
 
-    async def resume(self, author: Author, watching: tuple[str, ...] = ()) -> None:
+    async def resume(
+        self, author: Author, watching: tuple[str, ...] = (), may_leave: Leaves = unwatched
+    ) -> None:
         """Record that `author` wants the run to go on, and send that to the engine. `watching`: the
-        robots that they watch. Do not wait for its effect. Raise NotSent if the message could not be
-        sent."""
+        robots that they watch; `may_leave`: raises NotSent if the message may not leave any more. Do
+        not wait for its effect. Raise NotSent if the message could not be sent."""
         self.tell(ResumeRequested(self._clock_us(), author, watching), author.id)
-        await self._link.resume(self.run.graph_name)
+        await self._link.resume(self.run.graph_name, leaves=self._unless_stopped(may_leave))
         self.look()
 
     async def modify(
@@ -193,11 +195,13 @@ class OpenRun:
         continue_from: str,
         watching: tuple[str, ...] = (),
         limits: Limits = NO_LIMITS,
+        may_leave: Leaves = unwatched,
     ) -> None:
         """Record that `author` gave the run another graph, and send it (`order`) to the engine.
         `version` and `digest`: the version and digest of the new graph; `continue_from`: the full
         name of an action to start then, "" for none; `watching`: the robots that they watch;
-        `limits`: the limits in force on the robot. Raise NotSent if it could not be sent,
+        `limits`: the limits in force on the robot; `may_leave`: as for `resume`. Raise NotSent if it
+        could not be sent,
         EngineRefused if the engine refuses it, and OutcomeUnknown if it cannot be known whether the
         engine runs it."""
         asked = ModifyRequested(
@@ -215,7 +219,7 @@ class OpenRun:
         before = self.run
         self.tell(asked, author.id)
         try:
-            await self._link.modify(order, continue_from)
+            await self._link.modify(order, continue_from, self._unless_stopped(may_leave))
         except (NotSent, EngineRefused) as why:
             self.tell(
                 ModifyRefused(
@@ -235,6 +239,17 @@ class OpenRun:
             self._compare_change(order, continue_from)
             raise OutcomeUnknown(text) from error
         self._compare_change(order, continue_from)
+
+    def _unless_stopped(self, may_leave: Leaves) -> Leaves:
+        """Return the check of a message that lets the run go on, right before it leaves: it raises
+        NotSent if a Stop was pressed by now, or as `may_leave` does."""
+
+        def leave() -> None:
+            if self.run.desired == "stopped":
+                raise NotSent("The run is being stopped.")
+            may_leave()
+
+        return leave
 
     def _compare_change(self, order: Order, continue_from: str) -> None:
         """Have the next answer of the engine compared with a changed graph (`order`) that was or
@@ -431,6 +446,7 @@ class OpenRun:
                         self.watch.unanswered(changes, self._link.standing, why)
                     else:
                         self.watch.answered(changes, self._link.standing, answer, look)
+                        self._stopping.is_held_elsewhere = self.watch.is_elsewhere
                 for job in self.watch.take_jobs():
                     beside.start_soon(self._work_on, job)
                 if self.run.process is not None and has_ended(self.run.process):

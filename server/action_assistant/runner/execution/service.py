@@ -227,10 +227,10 @@ class ExecutionService:
         it names; "" for both where it stops everything."""
         self._stop_watchers.append(watcher)
 
-    def hold_back(self, what: str, author: Author) -> None:
-        """Let no start leave that was requested before, of the repeat or with the request id `what`: a
-        Stop was pressed."""
-        self._stops.note(what, author)
+    def hold_back(self, what: str, why: str) -> None:
+        """Let no start leave that was requested before, of the repeat or with the request id `what`. `why`:
+        the reason, as a sentence."""
+        self._stops.refuse(what, why)
 
     def occupying(self, robot: str) -> Run | None:
         """Return the open run that keeps a robot occupied; None if no run does."""
@@ -440,8 +440,11 @@ class ExecutionService:
         not start on its robot."""
         opened = no_piece(await self._movable(run))
         watching = watched_in(asked.watching if asked else {}, opened.run.robots)
-        self._led.require_rights(opened.run, author, identity, claim_of(opened.run, watching))
-        return await interventions.resume(opened, author, watching)
+        claim = claim_of(opened.run, watching)
+        self._led.require_rights(opened.run, author, identity, claim)
+        by = identity or operator_of(author)
+        may_leave = partial(self.rights.require_still, opened.run.robots, by, claim)
+        return await interventions.resume(opened, author, watching, may_leave)
 
     async def modify(
         self, run: str, body: bytes, author: Author, identity: Identity | None = None

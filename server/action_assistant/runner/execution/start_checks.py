@@ -15,14 +15,20 @@ from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
+from action_assistant.runner.execution.accepted_start import AcceptedStart, LedStart
 from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS, leading_facts
 from action_assistant.runner.execution.earlier_runs import EarlierRuns
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
-from action_assistant.runner.links.port import CONDUCTED, SIMULATOR, Answer, Link, NoAnswer
-from action_assistant.runner.links.simulator import LeadableLink, Simulator
+from action_assistant.runner.links.port import (
+    CONDUCTED,
+    SIMULATOR,
+    Answer,
+    NoAnswer,
+)
+from action_assistant.runner.links.simulator import Simulator
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, Overridden, Requested
@@ -33,7 +39,6 @@ from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import (
     GroupRequest,
     Prepared,
-    PreparedPieces,
     StartRequest,
     prepared,
     prepared_pieces,
@@ -63,7 +68,6 @@ from action_assistant.runner.start.rights_registry import (
 )
 from action_assistant.runner.start.start_from import EarlierRun
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
-from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.check import forbids_start
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.umrf.kept_values import has_keeper
@@ -94,45 +98,6 @@ class StartSources(msgspec.Struct, frozen=True):
 
 
 NO_SOURCES: Final = StartSources()
-
-
-class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that nothing prevents. It is sent over `link`, which the run owns if simulated, to
-    the engine process with the id `incarnation`. `despite`: problems that a person overrides;
-    `led`: the further part of a led run, else None; `keeps`: the engine has the helper
-    package, so that values can be read from it."""
-
-    request: StartRequest
-    prepared: Prepared
-    link: Link
-    is_simulated: bool
-    incarnation: str
-    despite: tuple[Overridden, ...] = ()
-    led: "LedStart | None" = None
-    keeps: bool = False
-
-    @property
-    def overridden(self) -> tuple[str, ...]:
-        """The codes of the problems that the starter has chosen to override."""
-        return overridden_in(self.request)
-
-    @property
-    def breakpoints(self) -> tuple[Breakpoint, ...]:
-        """The breakpoints at which the run will wait: none if its engine gets the whole graph."""
-        return self.led.pieces.breakpoints if self.led else ()
-
-
-class LedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of an accepted start that only a led run has. `lives`: the id of each robot's
-    engine process when it was checked; `by_word`: those of them of which only the starter vouches
-    that they index their files once; `keeping`: the robots that have the helper package; `engine`:
-    plays the whole graph."""
-
-    pieces: PreparedPieces
-    lives: dict[str, str]
-    by_word: dict[str, str]
-    keeping: tuple[str, ...]
-    engine: LeadableLink
 
 
 class StartChecks:
@@ -397,6 +362,7 @@ class StartChecks:
             link=robot,
             is_simulated=False,
             incarnation=view.answer.incarnation,
+            doubt=view.standing.doubt,
             despite=_overridden(ready, (free, *items)),
             keeps=has_keeper(view.index.actions),
         )

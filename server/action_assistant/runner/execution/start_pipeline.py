@@ -16,21 +16,19 @@ nothing behind, and a start that cannot be stored is not sent.
 
 from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
-from functools import partial
+from weakref import WeakValueDictionary
 
 import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Refused
 from action_assistant.random_ids import random_id
+from action_assistant.runner.execution.accepted_start import AcceptedStart
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.start_checks import (
-    AcceptedStart,
-    StartChecks,
-)
-from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
+from action_assistant.runner.execution.start_checks import StartChecks
+from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Leaves, NotSent, Order
 from action_assistant.runner.runs.events import Author, Led, PartOfRepeat, Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
@@ -79,7 +77,7 @@ class StartPipeline:
         self._stops = stops
         self._clock_us = runtime.clock_us
         self._claims = IdempotentStarts(runtime.journal, runtime.tasks, runtime.clock_us)
-        self._turns: dict[str, anyio.Lock] = {}
+        self._turns: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
 
     async def start(
         self,
@@ -139,8 +137,9 @@ class StartPipeline:
         change of a robot's registration. It waits until they are free. They are locked in the order of
         their names, so that two callers never wait for each other."""
         async with AsyncExitStack() as held:
-            for key in sorted(keys):
-                await held.enter_async_context(self._turns.setdefault(key, anyio.Lock()))
+            locks = [self._turns.setdefault(key, anyio.Lock()) for key in sorted(keys)]
+            for lock in locks:
+                await held.enter_async_context(lock)
             yield
 
     def is_under_way(self, request_id: str) -> bool:
@@ -190,23 +189,34 @@ class StartPipeline:
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)
             occupied = self._checks.why_occupied(accepted)
-            opened = self._open(accepted, requested, run, starter)
+            of_repeat = repeat.id if repeat is not None else ""
+            names = (*robots, group or "", of_repeat, accepted.request.request_id)
+
+            def may_leave() -> None:
+                if why := self._stops.why_refused(stops, *names):
+                    raise NotSent(why)
+                self._rights.require_still(robots, starter, claim)
+                accepted.require_still()
+
+            opened = self._open(accepted, requested, run, starter, may_leave)
             if occupied:
                 opened.end("refused", occupied)
-            of_repeat = repeat.id if repeat is not None else ""
-            stopped = (*robots, group or "", of_repeat, accepted.request.request_id)
-            if pressed := self._stops.since(stops, *stopped):
+            if pressed := self._stops.since(stops, *names):
                 opened.stop(*pressed)
+            elif why := self._stops.why_refused(stops, *names):
+                opened.end("refused", why)
             self._runs.drive(opened, order, accepted.incarnation)
         await opened.published.wait()
         return opened.run
 
     def _open(
-        self, accepted: AcceptedStart, requested: Requested, run: Run, starter: Identity
+        self,
+        accepted: AcceptedStart,
+        requested: Requested,
+        run: Run,
+        starter: Identity,
+        may_leave: Leaves,
     ) -> OpenRun:
-        robots = engines_of(accepted.request)
-        claim = claim_of(accepted.request, accepted.prepared)
-        may_leave = partial(self._rights.require_still, robots, starter, claim)
         if accepted.led is None:
             is_simulated = accepted.is_simulated
             return self._runs.open(

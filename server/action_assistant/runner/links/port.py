@@ -254,17 +254,21 @@ class Link(Protocol):
         NotSent if it could not be sent."""
         ...
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Publish one resume message for the graph of this name. `continue_from` is the full name
-        of an action that is started when the graph goes on, "" for none. Raise NotSent if the
-        message could not be sent."""
+        of an action that is started when the graph goes on, "" for none; `leaves`: as for a start.
+        Raise NotSent if the message could not be sent."""
         ...
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Publish one modify message: the order's graph takes the place of the running graph of the
         same name. `continue_from`: the full name of an action that is started when the graph goes
-        on, "" for none. Raise NotSent if the message could not be sent, EngineRefused if the engine
-        refuses the change."""
+        on, "" for none; `leaves`: as for a start. Raise NotSent if the message could not be sent,
+        EngineRefused if the engine refuses the change."""
         ...
 
     async def get(self) -> Answer:

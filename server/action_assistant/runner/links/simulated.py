@@ -205,12 +205,17 @@ class SimulatedLink:
         """Send the engine the command to pause a graph. Do not wait for its effect."""
         self._say(next(self._numbers), "pause", graph_name)
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Send the engine the command to resume a paused graph. `continue_from`: the full name of
         an action that is started then, "" for none. Do not wait for its effect."""
+        leaves()
         self._say(next(self._numbers), "resume", graph_name, continue_from)
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Replace a running graph by the one in `order` now. `continue_from`: the full name of an
         action that is started then, "" for none. Raise NotSent if the process cannot take the
         change, EngineRefused if the engine refuses it."""

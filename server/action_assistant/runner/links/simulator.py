@@ -200,18 +200,24 @@ class SimulatorLink:
         if self._dead is None:
             self._tell(self._engine.pause(graph_name, self._now()))
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Resume a paused graph now; does nothing if the engine has crashed or hangs.
         `continue_from`: the full name of an action that is started then, "" for none."""
+        leaves()
         if self._dead is None:
             self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Replace a running graph by the one in `order` now. `continue_from`: the full name of an
         action that is started then, "" for none. Raise NotSent if the engine has crashed or hangs,
         EngineRefused if it refuses the change."""
         if self._dead is not None:
             raise NotSent(self._dead)
+        leaves()
         try:
             self._tell(self._engine.modify(_whole(order), self._now(), continue_from=continue_from))
         except semantics.GraphRefused as refused:

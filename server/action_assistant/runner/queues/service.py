@@ -576,8 +576,8 @@ class Queues:
         by = doubt.by.id if doubt.by is not None else ""
         self._tasks.start_soon(self._store, stream_of_robot(queue.name), event, by)
         for entry in self._entries:
-            if doubt.by is not None and queue.name in entry.queue_names and entry.turn.locked():
-                self._control.hold_back(request_of(entry.id), doubt.by)
+            if queue.name in entry.queue_names and entry.turn.locked():
+                self._control.hold_back(request_of(entry.id), "Its queue was closed meanwhile.")
         self._survey()
         self._changed()
 

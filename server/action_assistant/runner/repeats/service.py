@@ -420,8 +420,8 @@ class Repeats:
         )
         self._follow(record, event)
         self._tasks.start_soon(self._store, record, event)
-        if reason.by is not None:
-            self._control.hold_back(record.repeat.id, reason.by)
+        why = "Its repeat was closed before anything was sent."
+        self._control.hold_back(record.repeat.id, why)
 
     def _follow(self, record: _Record, event: RepeatEvent) -> None:
         followed = follow(record.repeat, event)

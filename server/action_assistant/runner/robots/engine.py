@@ -140,13 +140,17 @@ class KnownEngine:
     async def pause(self, graph_name: str) -> None:
         await self._link.pause(graph_name)
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        await self._link.resume(graph_name, continue_from)
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
+        await self._link.resume(graph_name, continue_from, leaves)
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify message. Raise NotSent if it could not be sent, EngineRefused if the
-        engine refuses the change."""
-        await self._link.modify(order, continue_from)
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
+        """Publish one modify message. `leaves`: as for a start. Raise NotSent if it could not be sent,
+        EngineRefused if the engine refuses the change."""
+        await self._link.modify(order, continue_from, leaves)
 
     async def get(self) -> Answer:
         """Ask the engine with a get for all graphs that it holds, and note the answer. Raise

@@ -22,12 +22,26 @@ from action_assistant.web.auth.caller import BackgroundTasks
 
 
 class StopOrder:
-    """Counts Stops, so that a start that was asked for before a Stop does not leave after it.
-    Robots and groups are known by their names; "" stands for everything."""
+    """Counts Stops, so that a start that was asked for before a Stop does not leave after it, and
+    other reasons for which starts that are under way may not leave. Robots and groups are known by
+    their names; "" stands for everything."""
 
     def __init__(self) -> None:
         self.count = 0
         self._newest: dict[str, tuple[int, Author, str]] = {}
+        self._refused: dict[str, tuple[int, str]] = {}
+
+    def refuse(self, what: str, why: str) -> None:
+        """Let no start of this repeat, or with this request id, leave that was asked for before now.
+        `why`: the reason, as a sentence."""
+        self.count += 1
+        self._refused[what] = self.count, why
+
+    def why_refused(self, count: int, *names: str) -> str:
+        """Return why a start with one of these names, which was asked for after the first `count`
+        Stops, may not leave any more; "" if it may."""
+        known = (self._refused[each] for each in names if each in self._refused)
+        return next((why for number, why in known if number > count), "")
 
     def note(self, what: str, author: Author, stop_id: str = "") -> None:
         """Count a Stop of this robot or group, or of everything."""

@@ -31,10 +31,12 @@ class StopAttempt(NamedTuple):
 
 class StopLoop:
     """Takes presses of Stop for one run, and yields the times at which stop messages are due.
-    `hung`: why the engine will never answer again."""
+    `hung`: why the engine will never answer again; `is_held_elsewhere`: the run is lost, but the
+    process of the engine that answers now has it."""
 
     def __init__(self, run: Run, clock_us: ClockUs) -> None:
         self.hung = ""
+        self.is_held_elsewhere = False
         self._run = run
         self._clock_us = clock_us
         self._wanted = anyio.Event()
@@ -84,10 +86,10 @@ class StopLoop:
                 gap = _FIRST_GAP_S
 
     async def _until_due(self) -> None:
-        """Wait until the next stop message may be sent. That is at once while the engine holds the
+        """Wait until the next stop message may be sent. That is at once while an engine holds the
         run; later a person has to press Stop for each message, since a graph of that name would be
         another one."""
-        while self._run.lost and not self._pressed.is_set():
+        while self._run.lost and not (self._pressed.is_set() or self.is_held_elsewhere):
             with anyio.move_on_after(_GAP_S):
                 await self._pressed.wait()
         self._pressed = anyio.Event()

@@ -34,7 +34,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.links.ros2.domain import Domain
 from action_assistant.runner.links.ros2.newcomers import Newcomers
-from action_assistant.runner.links.ros2.outlets import Topics
+from action_assistant.runner.links.ros2.outlets import M, Topics
 from action_assistant.runner.links.ros2.peers import (
     OLDER,
     belonging,
@@ -137,7 +137,9 @@ class Ros2Link:
         with _sent_or_not():
             await domain.outlets.pause.send(lambda: message)
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+    async def resume(
+        self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Publish one resume message for the graph of this name. Raise NotSent if it could not be
         sent, or if `continue_from` names an action: over ROS 2 a graph only goes on where it was.
         """
@@ -146,9 +148,11 @@ class Ros2Link:
         domain = self._reachable("resume", self._topics.resume)
         message = UmrfGraphResume(umrf_graph_name=graph_name, targets=[self._name])
         with _sent_or_not():
-            await domain.outlets.resume.send(lambda: message)
+            await domain.outlets.resume.send(_once_left(message, leaves))
 
-    async def modify(self, order: Order, continue_from: str = "") -> None:
+    async def modify(
+        self, order: Order, continue_from: str = "", leaves: Leaves = unwatched
+    ) -> None:
         """Publish one modify message with the graph in `order`. `continue_from`: the full name of
         an action that is started when the graph goes on, "" for none. Raise NotSent if it could not
         be sent."""
@@ -159,7 +163,7 @@ class Ros2Link:
             modified_graph=order.umrf,
             continue_from=continue_from,
         )
-        await domain.outlets.modify.send(lambda: message)
+        await domain.outlets.modify.send(_once_left(message, leaves))
 
     def _joined(self) -> Domain:
         if self._domain is None:
@@ -426,6 +430,17 @@ class Ros2Link:
             for each in domain.publishers(self._topics.feedback)
             if each.logger == logger
         )
+
+
+def _once_left(message: M, leaves: Leaves) -> Callable[[], M]:
+    """Return a function for an outlet: it calls `leaves` in the moment in which the message leaves, and
+    returns the message."""
+
+    def make() -> M:
+        leaves()
+        return message
+
+    return make
 
 
 @contextmanager
