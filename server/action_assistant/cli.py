@@ -170,7 +170,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         posix=True,
     ),
     "doctor": CommandEntry(
-        "doctor.doctor",
+        "doctor.command",
         "look what is wrong: ROS 2, robots, folders, databases, ports, the page",
         diagnoses=True,
     ),

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands.doctor.doctor import engines_index_once, robots_have_names
 from action_assistant.commands.doctor.installation import Installation
+from action_assistant.commands.doctor.robot_checks import engines_index_once, robots_have_names
 
 
 @contextmanager

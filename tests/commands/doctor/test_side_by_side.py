@@ -28,7 +28,7 @@ def test_robots_are_asked_while_disks_are_looked_at(
     monkeypatch.setattr(
         doctor, "examine", partial(_with_checks, [lambda _: meets(disk, robot, "disks")])
     )
-    seen = list(doctor._looked_at(Installation(data=tmp_path), None))
+    seen = list(doctor.looked_at(Installation(data=tmp_path), None))
     assert [(each.where, each.message) for each in seen] == [("disks", "met"), ("robots", "met")]
 
 

@@ -18,7 +18,7 @@ from action_assistant.web.auth.access import Needs
 
 _PATIENCE_S: Final = 90.0  # it looks for robots, too
 _FRESH_S: Final = 5.0
-_NICE: Final = 10
+_NICE: Final = 5  # as of workers for which a person waits
 
 
 class LastExamination(msgspec.Struct, frozen=True):
