@@ -221,3 +221,18 @@ def test_a_client_that_floods_through_a_proxy_takes_nothing_from_others_behind_i
             f"http://127.0.0.1:{port}/api/graphs", headers=BEARER, trust_env=False, timeout=5
         )
         assert answer.status_code == 200
+
+
+def test_an_address_that_is_too_long_is_a_refusal_that_its_sender_can_read(tmp_path: Path) -> None:
+    with process("runner", tmp_path) as port, ExitStack() as stack:
+        url = f"http://127.0.0.1:{port}/api/robots"
+        for _ in range(20):  # that a reset takes the refusal away is a matter of chance
+            (one,) = strangers(stack, port, 1, b"GET /" + b"a" * 400_000)
+            one.sendall(b"a" * 400_000 + b" HTTP/1.1\r\nhost: localhost\r\n\r\n")
+            assert b" 414 URI Too Long\r\n" in one.recv(1000)
+        fields = {f"x-{n}": "a" * 50_000 for n in range(10)}
+        assert httpx.get(url, headers=fields, trust_env=False).status_code == 431
+        # Nobody goes on for ever.
+        (endless,) = strangers(stack, port, 1, b"GET /" + b"a" * 400_000)
+        with pytest.raises(OSError, match=r"reset|[Bb]roken pipe"):
+            endless.sendall(b"a" * 100_000_000)

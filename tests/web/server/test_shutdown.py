@@ -160,9 +160,10 @@ def spoken(said: bytes) -> tuple[_Http, Wire]:
 
 async def test_a_refusal_that_is_still_going_out_is_not_cut_off() -> None:
     protocol, wire = spoken(CRUMBS)
-    assert wire.is_closing()
+    protocol.data_received(b"x" * 1000)  # its sender has not read it yet
+    assert not wire.is_closing()
     protocol.shutdown()
-    assert not wire.is_cut_off
+    assert (wire.is_closing(), wire.is_cut_off) == (True, False)
 
 
 async def test_an_idle_connection_is_closed() -> None:

@@ -44,10 +44,15 @@ _RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", defau
 _FAILED: Final = 3  # exit code when the application could not be set up
 _BODY_S: Final = 30.0  # between two pieces of a body
 _ENDED_EARLY: Final = "The body ended early."
-_LENGTH_REQUIRED: Final = (
-    b"HTTP/1.1 411 Length Required\r\ncontent-type: text/plain; charset=utf-8\r\n"
-    b"connection: close\r\ncontent-length: 21\r\n\r\nA body has a length.\n"
+_LENGTH_REQUIRED: Final = "411 Length Required", "A body has a length."
+_ADDRESS_TOO_LONG: Final = "414 URI Too Long", f"An address has fewer than {HEAD_LIMIT} bytes."
+_HEAD_TOO_LONG: Final = (
+    "431 Request Header Fields Too Large",
+    f"An address and its header fields have fewer than {HEAD_LIMIT} bytes together.",
 )
+_TOO_LONG: Final = 431  # as h11 has it
+_HEARS_OUT_S: Final = 1.0  # after a refusal
+_HEARS_OUT: Final = 1 << 20  # bytes
 _LOOK_S: Final = 60.0  # between two looks at the certificate
 _PINGS: Final = 4  # in the time within which systemd wants one
 _GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger generations
@@ -271,10 +276,17 @@ class _Http(H11Protocol):
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
         self._strict = self.conn = _Strict(h11.SERVER, HEAD_LIMIT)
+        self._ignored: int | None = None  # bytes since a refusal
 
     def data_received(self, data: bytes) -> None:
         """Handle received bytes, and store the time of it, from which the header of a Stop is
-        computed."""
+        computed. After a refusal some are ignored: if they were not read, the reset of the connection
+        would take the refusal from its reader."""
+        if self._ignored is not None:
+            self._ignored += len(data)
+            if self._ignored > _HEARS_OUT:
+                self.transport.close()
+            return
         _RECEIVED.set((time.process_time(), time.perf_counter()))
         super().data_received(data)
 
@@ -289,17 +301,24 @@ class _Http(H11Protocol):
         super().timeout_keep_alive_handler()
 
     def send_400_response(self, msg: str) -> None:
-        """Answer a malformed request with a refusal: 411 if its body has no length, else 400 with
-        the text `msg`."""
-        if not self._strict.in_crumbs:
+        """Answer a malformed request with a refusal: 411 if its body has no length, 414 or 431 if
+        its address or header fields are too long, else 400 with the text `msg`."""
+        if self._strict.refusal is None:
             super().send_400_response(msg)
             return
-        self.transport.write(_LENGTH_REQUIRED)
-        self.transport.close()
+        status, text = self._strict.refusal
+        self.transport.write(
+            f"HTTP/1.1 {status}\r\ncontent-type: text/plain; charset=utf-8\r\nconnection: close\r\n"
+            f"content-length: {len(text) + 1}\r\n\r\n{text}\n".encode()
+        )
+        self._ignored = 0
+        self.loop.call_later(_HEARS_OUT_S, self.transport.close)
 
     def shutdown(self) -> None:
         """Close the connection, since the process shuts down."""
-        if not self.transport.is_closing():
+        if self._ignored is not None:
+            self.transport.close()
+        elif not self.transport.is_closing():
             end_connection(self.transport, super().shutdown)
             return
         # All is said, and goes out as far as the peer reads it. A refusal is none that h11 knows of.
@@ -308,17 +327,25 @@ class _Http(H11Protocol):
 
 class _Strict(h11.Connection):
     """Refuses a body without a length: to read chunks of one byte costs the server a thousand times
-    more than the client, which is not authenticated yet."""
+    more than the client, which is not authenticated yet. `refusal`: status and text for what was not
+    taken, None if there is nothing special to say."""
 
-    in_crumbs = False
+    refusal: tuple[str, str] | None = None
 
     def next_event(self) -> Any:
-        """Return the next event. Raise RemoteProtocolError for a request whose body has no length."""
-        event = super().next_event()
+        """Return the next event. Raise RemoteProtocolError for a request whose body has no length,
+        or whose head is too long."""
+        try:
+            event = super().next_event()
+        except h11.RemoteProtocolError as error:
+            if error.error_status_hint == _TOO_LONG:
+                in_address = b"\n" not in self.trailing_data[0]
+                self.refusal = _ADDRESS_TOO_LONG if in_address else _HEAD_TOO_LONG
+            raise
         if isinstance(event, h11.Request):
             names = [name for name, _ in event.headers]
             if b"transfer-encoding" in names:
-                self.in_crumbs = True
+                self.refusal = _LENGTH_REQUIRED
                 raise h11.RemoteProtocolError("a body needs a length", error_status_hint=411)
         return event
 
