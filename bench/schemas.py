@@ -2,7 +2,7 @@
 `make soak ARGS=schemas`. It needs the program `schemathesis` (PyPI), which nothing else here does.
 
 Fails if an answer is a server error. `postgres` starts a server of it for the editor, which alone is
-asked then (`make soak ARGS=schemas-postgres`).
+asked then (`make soak ARGS=schemas-postgres`); `runner` asks the runner alone.
 """
 
 import contextlib
@@ -21,6 +21,7 @@ from journal import servers
 from support.product import TOKEN, running
 
 EXAMPLES: Final = os.environ.get("SCHEMAS_EXAMPLES", "50")  # of each operation
+PATIENCE_S: Final = "100"  # for one answer: `GET /api/doctor` takes up to 90 s
 #: Streams that do not end, and what would sign the operator out.
 LEFT_OUT: Final = "(/events|/room|/api/live|/api/session|/api/devices/.*end)$"
 
@@ -47,16 +48,19 @@ def main(words: list[str]) -> int:
             "operator": [f"cookie: {cookie}", f"origin: {product.url}"],
             "stranger": [],
         }
-        for url in (product.url,) if on_postgres else (product.url, product.runner_url):
+        urls = [product.url, product.runner_url]
+        if words:
+            urls = [product.url if on_postgres else product.runner_url]
+        for url in urls:
             document = Path(folder) / "openapi.json"
             document.write_bytes(_document(url))
             for who, headers in people.items():
-                words = [word for each in headers for word in ("--header", each)]
+                sent = [word for each in headers for word in ("--header", each)]
                 done = subprocess.run(
                     [
-                        *(program, "run", str(document), "--url", url, *words),
+                        *(program, "run", str(document), "--url", url, *sent),
                         *("--checks", "not_a_server_error", "--max-examples", EXAMPLES),
-                        *("--exclude-path-regex", LEFT_OUT, "--request-timeout", "20"),
+                        *("--exclude-path-regex", LEFT_OUT, "--request-timeout", PATIENCE_S),
                         *("--phases", "examples,coverage,fuzzing", "--continue-on-failure"),
                     ],
                     cwd=folder,
