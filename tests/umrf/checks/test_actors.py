@@ -172,9 +172,13 @@ def test_two_actions_of_one_actor_that_may_run_at_once_are_both_named() -> None:
 
 
 def test_an_action_that_can_run_more_than_once_is_loaded_anew() -> None:
-    graph = owned(LOOP, A="Carrier", B="Scout")
+    back, out = Conditions("ignore", "run"), Conditions("run", "ignore")
+    loop = graph_of("entry>A", "A>B", "B>A", "B>C", "C>exit", AB=out, BA=back, BC=out)
+    graph = owned(optional(loop, "B>A"), A="Carrier", B="Scout", C="Carrier")
     assert told(graph) == [("actors", ""), ("loaded-anew", "A"), ("loaded-anew", "B")]
-    join = graph_of("entry>A", "A>B", "A>C", "B>D", "C>D", "D>exit")
+    ended = owned(LOOP, A="Carrier", B="Scout")  # its first way back is its end, too
+    assert told(ended) == [("actors", ""), ("loaded-anew", "A")]
+    join = graph_of("entry>A", "A>B", "A>C", "B>D", "C>D", "D>exit", Dexit=out)
     assert ("loaded-anew", "D") in told(owned(optional(join, "B>D", "C>D"), A="Carrier", B="Scout"))
 
 

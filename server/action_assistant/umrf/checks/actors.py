@@ -121,7 +121,7 @@ class _LedGraph:
         for relation in arrows:
             self._check_stop(subject, relation, actors_of, reports)
         self._check_at_once(subject, actors_of, runs, concurrency)
-        self._check_repeated(subject, actors_of, runs)
+        self._check_repeated(subject, actors_of, runs, concurrency)
         if self._is_cast:  # what a start refuses is not among what it asks people about
             return
         _check_values(subject, arrows, actors_of, reports)
@@ -196,12 +196,14 @@ class _LedGraph:
                     "two-at-once", "warning", message, action=subject.actions[key], also=also
                 )
 
-    def _check_repeated(self, subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
+    def _check_repeated(
+        self, subject: Subject, actors_of: _ByKey, runs: Container[Key], concurrency: Concurrency
+    ) -> None:
         """Report the actions that can run more than once, since a robot that is led loads them anew
         each time; but no sub-graphs, whose actions an engine loads anew in any case. `actors_of`:
         the actors of each action by key."""
         graph = msgspec.structs.replace(subject.graph, relations=tuple(subject.sound))
-        again = repeated(graph)
+        again = repeated(graph) if concurrency.again is None else concurrency.again
         for action in subject.real:
             if action.key not in again or action.key not in runs or action.name in self._actors:
                 continue

@@ -1,18 +1,29 @@
 """Finds the actions that may run at the same time, as far as arrows and possible outcomes tell.
 
 See docs/umrf-and-the-engine.md 2.3. It reports too many pairs rather than too few: durations are
-not known, and combinations of outcomes are not examined. But an action that a join waits for is
-over when the join begins.
+not known. Of a small graph all courses are followed (`courses.together`); of another one combinations of
+outcomes are not examined. But an action that a join waits for is over when the join begins.
 """
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import Final
 
+from msgspec.structs import replace
+
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.components import Mask, nodes_in, reachable
-from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
+from action_assistant.umrf.courses.together import together
+from action_assistant.umrf.model import (
+    ENTRY,
+    EXIT,
+    PRECONDITIONS,
+    Graph,
+    Key,
+    Precondition,
+    Relation,
+)
 
 #: The most pairs that are examined. If there are more, any two actions are taken to run at once.
 PAIRS: Final = 400_000
@@ -48,6 +59,12 @@ class Concurrency:
             key: [r.parent for r in listed if r.required and r.parent in self.index]
             for key, listed in subject.incoming.items()
         }
+        #: The keys of the actions that can begin again after they have run; None where that is not known.
+        self.again: Collection[Key] | None = None
+        courses = together(self._sound_graph()) if self.known and self._repeated else None
+        if courses is not None:
+            self.again = courses.again
+            self._repeated = self._mask(courses.again)
         if self.known:
             self._starts: dict[Precondition, list[Mask]] = {}
             self._open = deque[Key](key for key in reports if key != EXIT)
@@ -60,6 +77,15 @@ class Concurrency:
                     self._follow(key)
                 else:
                     self._join(self._joins.pop())
+        if courses is not None:
+            for key, beside in courses.beside.items():
+                self._with[self.index[key]] &= self._mask(beside)
+
+    def _sound_graph(self) -> Graph:
+        return replace(self._subject.graph, relations=tuple(self._subject.sound))
+
+    def _mask(self, keys: Iterable[Key]) -> Mask:
+        return sum(1 << self.index[key] for key in keys)
 
     @property
     def known(self) -> bool:
@@ -147,7 +173,8 @@ class Concurrency:
     @cached_property
     def _repeated(self) -> Mask:
         """Return, as a mask, the actions that may have reported and then run again although no path
-        of arrows leads back to them: several parents, or an action on a loop, start them."""
+        of arrows leads back to them: several parents, or an action on a loop, start them. Where the
+        courses were followed, those that do in one of them."""
         found = 0
         for index, after in enumerate(self._after):
             if after >> index & 1:
