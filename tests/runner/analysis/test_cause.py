@@ -203,6 +203,20 @@ def test_an_arrow_that_passes_the_outcome_over_is_named() -> None:
     ]
 
 
+def test_a_halted_graph_names_the_last_end_that_nothing_follows() -> None:
+    a, b = (state(3, "A_0", "RUNNING"), *_ended(4, "A_0", "true")), state(4, "B_0", "RUNNING")
+    halted = [Observed(5, (*a, b, *_ended(5, "B_0", "false"))), Ended(6, "halted", "on_halted")]
+    sentence = "B ended false, and nothing follows that: the exit was not reached."
+    assert found(LINE, *halted) == [sentence]
+    unseen = [Observed(4, (*a, b)), Ended(6, "halted", "on_halted")]
+    assert found(LINE, *unseen) == [], "how B ended was not seen"
+    true = [Observed(5, (*a, b, *_ended(5, "B_0", "true"))), Ended(6, "halted", "on_halted")]
+    assert found(LINE, *true) == [], "an arrow follows that, so it was something else"
+    both = (state(3, "A_0", "RUNNING"), state(3, "B_0", "RUNNING"))
+    fork = [Observed(5, (*both, *_ended(4, "A_0", "true"), *_ended(5, "B_0", "false")))]
+    assert found(FORK, *fork, Ended(6, "halted", "on_halted"))[-1] == sentence
+
+
 def _ended(at: int, name: str, result: str) -> tuple[Any, ...]:
     end = "ERROR" if result == "error" else "FINISHED"
     return NodeResult(at, "task", name, f"on_{result}"), state(at, name, end)

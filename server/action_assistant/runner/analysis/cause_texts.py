@@ -9,6 +9,7 @@ from action_assistant.runner.analysis.causes import (
     Cause,
     EngineRestarted,
     ForeignCause,
+    NothingFollowed,
     OperatorChange,
     OperatorPause,
     OperatorStop,
@@ -60,6 +61,9 @@ def _in_words(cause: Cause, run: Run) -> str:
             return f"{who or 'An action'} is not known to {robot}, so it refused the graph."
         case Waiting():
             return _waits_in_words(cause, run, who)
+        case NothingFollowed(ended=ended):
+            how = "in error" if ended == "error" else ended
+            return f"{who} ended {how}, and nothing follows that: the exit was not reached."
         case EngineRestarted():
             return f"The engine of {run.engine} was restarted; what happened after is unknown."
         case ForeignCause():

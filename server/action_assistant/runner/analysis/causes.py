@@ -17,7 +17,7 @@ from action_assistant.runner.runs.events import Author, Overridden
 from action_assistant.runner.runs.run import Alarm, Intervention, Run, State
 from action_assistant.runner.runs.visits import ActionRun, Message, Visit
 from action_assistant.umrf.json.text import parse_small
-from action_assistant.umrf.model import EXIT, Action, Graph, Precondition, Relation
+from action_assistant.umrf.model import Action, Graph, Precondition, Relation
 
 _UNRESOLVED: Final = "Could not resolve graph"
 _REFUSAL: Final = "origin [in start"
@@ -102,6 +102,13 @@ class Waiting(_Evidence, frozen=True, tag="waiting", tag_field="kind"):
     ended: str = ""
 
 
+class NothingFollowed(_Evidence, frozen=True, tag="nothing_followed", tag_field="kind"):
+    """The last action that ran ended with the outcome `ended`, which none of its arrows follows, so that
+    the graph did not reach its exit."""
+
+    ended: str
+
+
 class Stalled(_Evidence, frozen=True, tag="stalled", tag_field="kind"):
     """The graph was RUNNING and none of its actions ran. `quote`: what `action` waited for."""
 
@@ -151,6 +158,7 @@ Cause: TypeAlias = (
     | WrongParameter
     | UnknownAction
     | Waiting
+    | NothingFollowed
     | Stalled
     | EngineRestarted
     | ForeignCause
@@ -192,6 +200,7 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
     yield from stalls
     if graph is not None and not stalls:
         yield from _waits(run, graph)
+        yield from _dead_ends(run, graph)
     if not refused:
         yield from _silence(run)
     yield from _alarms(run, {refusals.REFUSED} if refused else set())
@@ -528,6 +537,28 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
             yield from _waiting(run, names, child.full_name, arrows, moment)
 
 
+def _dead_ends(run: Run, graph: Graph) -> Iterator[NothingFollowed]:
+    """Yield the action whose end halted the graph: the last one that ended, if all its arrows ignore its
+    outcome. Yield nothing where events do not tell which one was the last. `graph`: as it was sent."""
+    if run.end != "halted":
+        return
+    keys = {action.full_name: action.key for action in graph.actions}
+    ended = _ended_visits(run, places_of(run), run.actions)
+    latest = max((max(visit.start, visit.until or 0) for _, _, visit in ended), default=0)
+    ignored = [
+        (at, name, visit)
+        for at, name, visit in ended
+        if at >= latest
+        and name in keys
+        and all(
+            _passes_over(arrow, visit) for arrow in graph.relations if arrow.parent == keys[name]
+        )
+    ]
+    if len(ignored) == 1:
+        at, name, visit = ignored[0]
+        yield NothingFollowed(at=at, action=name, ended=visit.result or "")
+
+
 def _around(run: Run, going: set[str]) -> set[str]:
     """Return those of the actions `going` that have another one of `going` inside, and so run only
     because the inner one does."""
@@ -599,11 +630,7 @@ def _passes_over(arrow: Relation, visit: Visit) -> bool:
         "error": "on_error",
     }
     outcome = outcomes.get(visit.result or "")
-    return (
-        arrow.child != EXIT
-        and outcome is not None
-        and (arrow.conditions.answer(outcome) == "ignore")
-    )
+    return outcome is not None and arrow.conditions.answer(outcome) == "ignore"
 
 
 def _silence(run: Run) -> Iterator[Cause]:
