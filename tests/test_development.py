@@ -7,8 +7,10 @@ import shlex
 import socket
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
+import pytest
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -54,23 +56,31 @@ def test_a_step_of_make_is_one_line_unless_it_fails() -> None:
     assert failed.stderr == "made\nbecause\n"
 
 
-def test_a_dead_index_of_packages_is_named_at_once_with_what_to_do(tmp_path: Path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as gone:
-        port = gone.getsockname()[1]
-    environment = {name: text for name, text in os.environ.items() if "PIP" not in name}
-    environment |= {
-        "PIP_INDEX_URL": f"http://me:secret@127.0.0.1:{port}/simple",
-        "PIP_CONFIG_FILE": os.devnull,
-    }
-    for name in ("http_proxy", "https_proxy", "all_proxy"):
-        environment.pop(name, None)
-        environment.pop(name.upper(), None)
-    words = [ROOT / "scripts" / "packages", sys.executable, "--target", tmp_path, "no-such-package"]
-    failed = subprocess.run(
-        list(map(str, words)), env=environment, capture_output=True, text=True, check=False
-    )
+@pytest.mark.parametrize("swallows", [False, True])
+def test_a_dead_index_of_packages_is_named_at_once_with_what_to_do(
+    tmp_path: Path, swallows: bool
+) -> None:
+    with ExitStack() as stack:
+        index = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        port = index.getsockname()[1]
+        if not swallows:  # a system takes connections that no program accepts
+            index.close()
+        environment = {name: text for name, text in os.environ.items() if "PIP" not in name}
+        environment |= {
+            "PIP_INDEX_URL": f"http://me:secret@127.0.0.1:{port}/simple",
+            "PIP_CONFIG_FILE": os.devnull,
+        }
+        for name in ("http_proxy", "https_proxy", "all_proxy"):
+            environment.pop(name, None)
+            environment.pop(name.upper(), None)
+        program = ROOT / "scripts" / "packages"
+        words = [program, sys.executable, "--target", tmp_path, "no-such-package"]
+        failed = subprocess.run(
+            list(map(str, words)), env=environment, capture_output=True, text=True, check=False
+        )
     assert failed.returncode == 1
-    said = f"The index of Python packages does not answer: 127.0.0.1:{port} (Connection refused)."
+    why = "timed out" if swallows else "Connection refused"
+    said = f"The index of Python packages does not answer: 127.0.0.1:{port} ({why})."
     assert said in failed.stderr
     assert "`make bundle`" in failed.stderr
     assert "Retrying" not in failed.stderr
