@@ -2,6 +2,7 @@
 
 `frontend/src/graph/edit/waits.test.ts` draws them, and keeps them in `tests/vectors/drawn.json`: for
 each graph its arrows, as "PARENT CHILD OUTCOMES", with "?" after those that are not waited for.
+`series.test.ts` beside it draws copies of actions, one after another, into such graphs.
 """
 
 import json
@@ -24,6 +25,8 @@ from action_assistant.umrf.semantics.trace import GraphStateEvent, NodeStateEven
 
 VECTORS = Path(os.environ.get("DRAWN_FILE", Path(__file__).parents[1] / "vectors" / "drawn.json"))
 DRAWN: list[list[str]] = json.loads(VECTORS.read_text())
+SERIES_FILE = os.environ.get("SERIES_FILE", Path(__file__).parents[1] / "vectors" / "series.json")
+SERIES: list[list[str]] = json.loads(Path(SERIES_FILE).read_text())
 
 
 def graph_of(arrows: list[str]) -> Graph:
@@ -45,7 +48,7 @@ def graph_of(arrows: list[str]) -> Graph:
     return Graph(name="drawn", actions=actions, relations=tuple(relations))
 
 
-@pytest.mark.parametrize("arrows", DRAWN, ids=lambda arrows: " · ".join(arrows)[:60])
+@pytest.mark.parametrize("arrows", DRAWN + SERIES, ids=lambda arrows: " · ".join(arrows)[:60])
 def test_what_gestures_draw_ends_when_every_action_ends_true(arrows: list[str]) -> None:
     trace = list(simulate(graph_of(arrows), max_events=2_000))
     states = {each.state: each.t_ms for each in trace if isinstance(each, GraphStateEvent)}

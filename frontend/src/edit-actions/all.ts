@@ -36,6 +36,8 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   draw.cut,
   draw.pasteHere,
   draw.duplicate,
+  draw.duplicateWith,
+  draw.tryAgain,
   draw.removeSelection,
   draw.removeAndReconnect,
   draw.extract,

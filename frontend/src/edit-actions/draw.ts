@@ -14,6 +14,7 @@ import {
   IconPackageImport,
   IconPlayerPlay,
   IconPlus,
+  IconRotateClockwise,
   IconRouteAltRight,
   IconSquareCheck,
   IconSquareX,
@@ -121,6 +122,39 @@ export const duplicate: EditAction = {
     const keys = paste(context.doc, clip, { by: [40, 40] });
     context.select(keys);
     if (keys[0] !== undefined) context.view.focus(keys[0]);
+  },
+};
+
+/** The chosen actions that are in the graph, by key. */
+const chosenKeys = (context: EditorContext): Key[] =>
+  selectedActions(context).flatMap(({ key, missing }) => (missing ? [] : [key]));
+
+export const duplicateWith: EditAction = {
+  name: "duplicate-with",
+  label: "Duplicate with …",
+  group: "Draw",
+  shortcuts: [],
+  icon: IconCopyPlus,
+  changes: true,
+  also: "copies series values list robot repeat",
+  enabled: (context) => chosenKeys(context).length > 0,
+  idle: "Choose the actions first.",
+  run: (context) => context.openOverlay({ kind: "copies", actions: chosenKeys(context) }),
+};
+
+export const tryAgain: EditAction = {
+  name: "try-again",
+  label: "Try again …",
+  group: "Draw",
+  shortcuts: [],
+  icon: IconRotateClockwise,
+  changes: true,
+  also: "retry attempts repeat error fails",
+  enabled: (context) => chosenKeys(context).length === 1,
+  idle: "Choose an action first.",
+  run: (context) => {
+    const [action] = chosenKeys(context);
+    if (action) context.openOverlay({ kind: "tries", action });
   },
 };
 

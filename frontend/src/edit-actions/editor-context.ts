@@ -69,6 +69,10 @@ export type Overlay =
   | { readonly kind: "extract"; readonly actions: readonly Key[] }
   /** The actions of the graph for which this one stands, in its place. */
   | { readonly kind: "unpack"; readonly action: Key }
+  /** Further tries of this action. */
+  | { readonly kind: "tries"; readonly action: Key }
+  /** Copies of these actions, each with another value. */
+  | { readonly kind: "copies"; readonly actions: readonly Key[] }
   /** The graph is called otherwise now, and others have actions that stand for it under the old name. */
   | {
       readonly kind: "renamed";
@@ -217,7 +221,7 @@ export function selectedRelations(context: EditorContext): Relation[] {
  * Returns the boxes that cards and ends occupy. An exit that nobody has placed is left out, since it moves away by
  * itself.
  */
-function takenBoxes(context: EditorContext) {
+export function takenBoxes(context: EditorContext) {
   const floating = context.graph.exitPosition === null;
   const sizes = context.sizes();
   return [...context.positions()].flatMap(([key, [x, y]]) =>

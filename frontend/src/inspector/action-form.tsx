@@ -1,6 +1,6 @@
 /** Forms of an action: of one in a graph, and of one of the library. */
 import { Button, Group } from "@mantine/core";
-import { IconGhost2, IconPackage } from "@tabler/icons-react";
+import { IconGhost2, IconPackage, IconRotateClockwise } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, renameDocument, setField } from "../graph/edit";
@@ -48,7 +48,7 @@ function Ghost({ action }: { action: Action }) {
 }
 
 export function ActionForm({ action }: { action: Action }) {
-  const { doc, openOverlay } = useEditorContext();
+  const { doc, openOverlay, mayEdit } = useEditorContext();
   if (action.missing) return <Ghost action={action} />;
   return (
     <div className={style.form} data-form={action.key}>
@@ -75,14 +75,24 @@ export function ActionForm({ action }: { action: Action }) {
       <ActionBreakpoint action={action} />
       <section className={style.section}>
         <TypeField action={action} />
-        <Button
-          variant="default"
-          mt="sm"
-          leftSection={<IconPackage size={16} aria-hidden />}
-          onClick={() => openOverlay({ kind: "packages", action: action.name })}
-        >
-          C++ package
-        </Button>
+        <Group gap="sm" mt="sm">
+          <Button
+            variant="default"
+            leftSection={<IconPackage size={16} aria-hidden />}
+            onClick={() => openOverlay({ kind: "packages", action: action.name })}
+          >
+            C++ package
+          </Button>
+          {mayEdit && (
+            <Button
+              variant="default"
+              leftSection={<IconRotateClockwise size={16} aria-hidden />}
+              onClick={() => openOverlay({ kind: "tries", action: action.key })}
+            >
+              Try again …
+            </Button>
+          )}
+        </Group>
       </section>
     </div>
   );

@@ -22,12 +22,13 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
     cut,
     pasteHere,
     duplicate,
+    duplicateWith,
     removeSelection: remove,
     removeAndReconnect: heal,
   } = editActions;
   if (actions + notes > 1) {
     return [
-      [copy, cut, duplicate, pasteHere],
+      [copy, cut, duplicate, duplicateWith, pasteHere],
       [
         editActions.tidySelection,
         ...editActions.ALIGN,
@@ -61,8 +62,8 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
         editActions.breakpoint,
       ],
       [editActions.runFrom, editActions.runOnly, editActions.dryRunFrom, editActions.dryRunOnly],
-      [copy, cut, duplicate, pasteHere],
-      [editActions.extract, editActions.unpack],
+      [copy, cut, duplicate, duplicateWith, pasteHere],
+      [editActions.tryAgain, editActions.extract, editActions.unpack],
       [editActions.frame, editActions.zoomSelection, editActions.copyLink, editActions.packages],
       [remove, heal],
     ];

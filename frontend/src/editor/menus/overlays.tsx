@@ -11,23 +11,8 @@ const CommandPalette = lazyPart(() =>
   import("./command-palette").then((part) => part.CommandPalette),
 );
 const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
-const FlatDialog = lazyPart(() =>
-  import("../../levels/flat-dialog").then((part) => part.FlatDialog),
-);
-const ExtractDialog = lazyPart(() =>
-  import("../../levels/sub-graph-dialogs").then((part) => part.ExtractDialog),
-);
-const UnpackDialog = lazyPart(() =>
-  import("../../levels/sub-graph-dialogs").then((part) => part.UnpackDialog),
-);
-const RenamedUses = lazyPart(() =>
-  import("../../canvas/renamed-uses").then((part) => part.RenamedUses),
-);
+const RareOverlay = lazyPart(() => import("./rare-overlay").then((part) => part.RareOverlay));
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
-const PackagesDialog = lazyPart(() =>
-  import("../../packages/packages-dialog").then((part) => part.PackagesDialog),
-);
-const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 
 interface Props {
   /** The graph is on screen. */
@@ -78,31 +63,16 @@ function OpenOverlay({ context, known, overlay, onClose }: Props) {
       return <RetargetDialog context={context} {...overlay} onClose={onClose} />;
     case "menu":
       return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
-    case "packages":
-      return <PackagesDialog context={context} {...overlay} onClose={onClose} />;
-    case "flat":
-      return <FlatDialog context={context} onClose={onClose} />;
-    case "extract":
-      return <ExtractDialog context={context} {...overlay} onClose={onClose} />;
-    case "unpack":
-      return <UnpackDialog context={context} {...overlay} onClose={onClose} />;
-    case "renamed": {
-      const uses = overlay.uses.map((id) => ({
-        id,
-        name: context.store.graphsInside.now()?.names.get(id) ?? "",
-      }));
-      return <RenamedUses graph={context.id} {...overlay} uses={uses} onClose={onClose} />;
-    }
     case "palette":
       return (
         <PartBoundary waiting={<TypingField />}>
           <CommandPalette context={context} onClose={onClose} />
         </PartBoundary>
       );
-    case "keys":
-      return <ShortcutSheet onClose={onClose} />;
     case "note": // edited on the canvas itself
     case "begin": // the page provides it, with the runs
       return null;
+    default:
+      return <RareOverlay context={context} overlay={overlay} onClose={onClose} />;
   }
 }
