@@ -137,6 +137,8 @@ const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.proof.v1": "true",
   "run.alarm_raised.v1": "error",
   "run.moves_again.v1": "error",
+  "run.held.v1": "stopped",
+  "run.released.v1": "run",
 };
 
 /** A mark in one sentence; empty for what needs none. */
@@ -168,6 +170,20 @@ export function markText(mark: Pick<ReplayMark, "kind" | "by" | "text" | "since"
       return "The engine answers again";
     case "run.alarm_raised.v1":
       return mark.text ?? "Alarm";
+    case "run.held.v1":
+      return `Nothing further begins${text}`;
+    case "run.released.v1":
+      return `${isolated(by)} let it go on${text}`;
+    case "run.handed_over.v1":
+      return `${isolated(by)} handed the run over to ${isolated(mark.text ?? "somebody")}`;
+    case "run.breakpoints_set.v1":
+      return `${isolated(by)} set its breakpoints: ${mark.text || "none"}`;
+    case "run.question_asked.v1":
+      return `A person is asked${text}`;
+    case "run.question_answered.v1":
+      return `${isolated(by)} answered${text}`;
+    case "run.question_closed.v1":
+      return `Nobody answered in time (${mark.text ?? "closed"})`;
     case "run.ended.v1":
       return `The run is over${text}`;
     default:

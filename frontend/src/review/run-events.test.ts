@@ -78,3 +78,21 @@ test("an end that was seen between two moments is told between them", () => {
     "true (not before +1.0); its code may go on",
   );
 });
+
+test("what held a run, and who let it go on, stand among its events", () => {
+  const run = ran("2026-11-20T09:00:01.000Z", "2026-11-20T09:00:02.000Z");
+  const marks = [
+    { kind: "run.held.v1", at: "2026-11-20T09:00:02.100Z", text: "Breakpoint before Grip_0." },
+    {
+      kind: "run.released.v1",
+      at: "2026-11-20T09:00:02.500Z",
+      by: "Ben",
+      text: "one step, Grip_0",
+    },
+    { kind: "run.stop_sent.v1", at: "2026-11-20T09:00:02.600Z", text: "attempt 1" },
+  ].map((mark, seq) => ({ seq, ...mark }));
+  const told = eventLines(run, "v1", marks).map(({ text }) => text);
+  expect(told).toContain("Nothing further begins: Breakpoint before Grip_0.");
+  expect(told).toContain("Ben let it go on: one step, Grip_0");
+  expect(told).not.toContain("Stop message: attempt 1");
+});

@@ -52,6 +52,13 @@ const TOLD: ReadonlySet<string> = new Set([
   "run.proof.v1",
   "run.silent.v1",
   "run.answered.v1",
+  "run.held.v1",
+  "run.released.v1",
+  "run.handed_over.v1",
+  "run.breakpoints_set.v1",
+  "run.question_asked.v1",
+  "run.question_answered.v1",
+  "run.question_closed.v1",
 ]);
 
 /** Return all events of a run as lines, oldest first; none stands before the start of the run. */

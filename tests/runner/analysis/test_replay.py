@@ -8,19 +8,26 @@ import msgspec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
+from action_assistant.runner.analysis.keyframes import APART, KeyframeStore, author_and_text
 from action_assistant.runner.analysis.replay import ReplayFrame, RunReplay, run_replay
 from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import (
     Author,
+    BreakpointsSet,
     Ended,
+    HandedOver,
+    Held,
     Observed,
+    Released,
     RunEvent,
     StopRequested,
     draft_of,
 )
 from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.runs.question_events import QuestionAsked
+from action_assistant.umrf.breakpoints import Breakpoint
+from action_assistant.umrf.questions import Question
 from runner.harness import MemoryJournal, virtual
 from runner.runs.test_runs import STARTED
 from support.doses import examples
@@ -204,3 +211,24 @@ async def test_keyframes_that_were_made_early_go_on_with_the_run() -> None:
     assert late.keys[-1].run == replay(events)
     run = replay(events[:1234])
     assert await keyframe_store.at("r1", 1234) == run
+
+
+def test_marks_say_what_held_a_led_run_and_who_let_it_go_on() -> None:
+    ann, ben = Author("ann", "Ann"), Author("ben", "Ben")
+    point = Breakpoint(action="Grip_0", visit=7)
+    asks = Question(kind="confirm", text="Is it free?")
+    asked = QuestionAsked(at=1, call=1, node="Ask_0", visit=1, question="q", asks=asks)
+    told: list[tuple[RunEvent, tuple[str, str]]] = [
+        (Held(at=1, why="Ann made it wait.", by=ann, how="wait"), ("Ann", "Ann made it wait.")),
+        (Held(at=1, why="A robot was lost."), ("", "A robot was lost.")),
+        (Released(at=1, author=ben), ("Ben", "")),
+        (Released(at=1, author=ben, step="Grip_0"), ("Ben", "one step, Grip_0")),
+        (Released(at=1, author=ben, over=("Pick", "Turn")), ("Ben", "over Pick › Turn")),
+        (HandedOver(at=1, author=ann, to=ben), ("Ann", "Ben")),
+        (
+            BreakpointsSet(at=1, author=ann, breakpoints=(point,)),
+            ("Ann", "before Grip_0, visit 7"),
+        ),
+        (asked, ("", "Is it free?")),
+    ]
+    assert [author_and_text(event) for event, _ in told] == [text for _, text in told]

@@ -17,12 +17,16 @@ from action_assistant.journal.events import BareEvent, Event, StreamSnapshot
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.runs.events import (
     AlarmRaised,
+    BreakpointsSet,
     Ended,
+    HandedOver,
+    Held,
     ModifyRefused,
     ModifyRequested,
     MovesAgain,
     Observed,
     PauseRequested,
+    Released,
     Requested,
     ResumeRequested,
     RunEvent,
@@ -34,11 +38,17 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.fold import begin, follow, replay
 from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.runs.question_events import (
+    QuestionAnswered,
+    QuestionAsked,
+    QuestionClosed,
+)
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 
-#: Raise it when `runs.fold` gives another run for the same events: older keyframes are not used then.
-FOLD: Final = 5
+#: Raise it when `runs.fold` gives another run, or marks have other texts, for the same events: older
+#: keyframes are not used then.
+FOLD: Final = 6
 #: Events between two keyframes, and in one page of a replay.
 APART: Final = 2_000
 _READ: Final = 5 * APART  # events that are read at once
@@ -48,6 +58,7 @@ MARKS: Final = 2_000
 _WORTH: Final = 500
 _AT: Final[Callable[[object], int]] = attrgetter("at")
 _CACHED: Final = 8  # runs whose keyframes stay in memory
+_SHOWN: Final = 200  # characters of an answer in a mark
 
 
 class Keyframe(msgspec.Struct, frozen=True):
@@ -275,6 +286,32 @@ def author_and_text(decoded: RunEvent) -> tuple[str, str]:
             return "", decoded.text
         case Ended():
             return "", decoded.detail
+        case _:
+            return _led_author_and_text(decoded)
+
+
+def _led_author_and_text(decoded: RunEvent) -> tuple[str, str]:
+    """Return the same for the events that only led runs have."""
+    match decoded:
+        case Held(by=by, why=why):
+            return by.name if by is not None else "", why
+        case Released(author=by, step=step, until=until, over=over):
+            limits = (
+                f"one step, {step}" * bool(step),
+                f"until {until}" * bool(until),
+                f"over {' › '.join(over)}" * bool(over),
+            )
+            return by.name, "".join(limits)
+        case HandedOver(author=by, to=to):
+            return by.name, to.name
+        case BreakpointsSet(author=by, breakpoints=breakpoints):
+            return by.name, "; ".join(each.words() for each in breakpoints)
+        case QuestionAsked(asks=asks):
+            return "", asks.text
+        case QuestionAnswered(by=by, value=value, reason=reason):
+            return by.name, (value or reason)[:_SHOWN]
+        case QuestionClosed(why=why):
+            return "", why
         case _:
             return "", ""
 
