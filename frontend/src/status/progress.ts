@@ -43,7 +43,8 @@ export function visitEnd(visit: Visit): number | null {
   return time(visit.until);
 }
 
-const resultTone: Record<string, Tone> = {
+/** The tone of a result, by its word. */
+export const resultTone: Readonly<Record<string, Tone>> = {
   true: "true",
   false: "false",
   error: "error",

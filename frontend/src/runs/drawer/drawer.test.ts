@@ -87,6 +87,25 @@ test("while a run is stopped none of its robots is said to wait", () => {
   expect(said({ desired: "stopped", rests: seen })).toEqual(["seen at rest", "at rest"]);
 });
 
+test("of a run that is over each robot has the end of its own last action", () => {
+  const actions = {
+    Drive_0: action("d", "FINISHED", [visit(0, 1, "true")]),
+    Look_0: action("l", "FINISHED", [visit(1, 2, "stopped")]),
+    Grip_0: action("g", "FINISHED", [visit(0, 1, "false")]),
+    Hold_0: action("h", "UNINITIALIZED"),
+    Wave_0: action("w", "RUNNING", [visit(1, null)]),
+  };
+  const of = { Drive: "atlas", Look: "atlas", Grip: "birch", Hold: "cedar", Wave: "people" };
+  const lanes = Object.entries(of).map(([name, robot]) => lane(`${name}_0`, robot));
+  const over = run({ actions, state: "lost", ended_at: iso(3) });
+  expect(robotTabs([over], lanes, false).map(({ words }) => words)).toEqual([
+    "stopped",
+    "false",
+    "did not run",
+    "lost",
+  ]);
+});
+
 test("values say whether they were seen or only sent, and what an action began after", () => {
   const doc = new Y.Doc();
   const look = addAction(doc, { name: "Look" });

@@ -5,14 +5,14 @@ import { enginesOf } from "../../api/led-runs";
 import { silentRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import { silentRests } from "../../api/run-stop";
-import { currentAlarm, type Run } from "../../api/runs";
+import { type ActionRun, currentAlarm, type Run, type Visit } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
 import { Answers } from "../../status/answers";
 import { RunQuestions } from "../../status/held-notice";
 import { isRobot, type Lane, performerWords, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
-import { runLabel, type Tone } from "../../status/progress";
+import { resultTone, runLabel, type Tone, visitEnd } from "../../status/progress";
 import { RestList } from "../../status/rest-list";
 import { knownRest, type RobotRest, restWords } from "../../status/rests";
 import { RunPoint } from "../../status/run-point";
@@ -59,10 +59,10 @@ function RobotTabList({ tabs }: { tabs: readonly RobotTab[] }) {
   return (
     <Tabs.List className={style.tabs ?? ""} aria-label="Who runs this graph">
       <Tabs.Tab value={ALL_ROBOTS}>{allWords(tabs)}</Tabs.Tab>
-      {tabs.map(({ id, robot, tone, words }) => (
+      {tabs.map(({ id, robot, actor, tone, words }) => (
         <Tabs.Tab key={id} value={id}>
           <span className={style.robot}>
-            <i style={{ background: colorOfName(robot) }} aria-hidden /> {robot}
+            <i style={{ background: colorOfName(actor ?? robot) }} aria-hidden /> {robot}
           </span>{" "}
           <StateLabel still tone={tone} word={words} />
         </Tabs.Tab>
@@ -250,7 +250,21 @@ function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
   }
   const { tone, word } = runLabel(run);
   if (names !== null && run.state === "running") return { tone: "idle", words: "waits" } as const;
-  return { tone, words: word };
+  if (names === null || run.ended_at === null) return { tone, words: word };
+  const last = lastVisit(own.map(([, action]) => action));
+  if (last === null) return { tone: "idle", words: "did not run" } as const;
+  const ended = resultTone[last.result ?? ""];
+  return ended === undefined ? { tone, words: word } : { tone: ended, words: ended };
+}
+
+/** Return the visit of these actions that ended last, or that was not seen to end; null if none began. */
+function lastVisit(actions: readonly ActionRun[]): Visit | null {
+  const end = (visit: Visit) => visitEnd(visit) ?? Number.POSITIVE_INFINITY;
+  const visits = actions.flatMap((action) => action.visits);
+  return visits.reduce<Visit | null>(
+    (last, visit) => (last === null || end(visit) >= end(last) ? visit : last),
+    null,
+  );
 }
 
 /** Words for the rest of a robot in its tab; the lines above say more. */
