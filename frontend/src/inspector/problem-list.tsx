@@ -1,7 +1,7 @@
 /** Lists the problems of a graph (wrong, to fill in, may go wrong) with their places and fixes. */
 import { ActionIcon, Button } from "@mantine/core";
 import { IconCircleCheck, IconLink, IconStairsDown, IconTool } from "@tabler/icons-react";
-import { useMemo } from "react";
+import { createContext, type FocusEvent, type KeyboardEvent, use, useMemo, useState } from "react";
 import type { Problems } from "../api/graphs";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
@@ -15,6 +15,7 @@ import type { CheckedPlaceInside, ProblemKind } from "../graph/problems/problem-
 import { endName } from "../graph/relation-words";
 import { INTO, spaced } from "../status/level-places";
 import { focusField } from "../ui/focus-field";
+import { keyOf } from "../ui/keys";
 import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
 import { type CheckedGroup, fieldOfGroup, firstField } from "./fields/field-problems";
@@ -44,11 +45,64 @@ function jump(context: EditorContext, told: CheckedGroup, place: string): void {
   focusField(`${place}|${field}`);
 }
 
-/** Fields for the missing values of a problem; numbers of one thing stand in a row. */
+/** A problem in whose fields somebody writes, as it was when they began, and the ids of those after it. */
+interface Held {
+  readonly told: CheckedGroup;
+  readonly after: ReadonlySet<string>;
+}
+
+const HoldContext = createContext<(told: CheckedGroup | null) => void>(() => {});
+
+/** Returns the problems with the held one at its place, also where it is solved. */
+function withHeld(open: readonly CheckedGroup[], held: Held | null): readonly CheckedGroup[] {
+  if (held === null) return open;
+  if (open.some(({ id }) => id === held.told.id))
+    return open.map((each) => (each.id === held.told.id ? held.told : each));
+  const at = open.findIndex(({ id }) => held.after.has(id));
+  return open.toSpliced(at < 0 ? open.length : at, 0, held.told);
+}
+
+const FIELDS = "[data-fill-in] :is(input:not([type=radio], [type=hidden]), textarea)";
+
+/** Goes on to the next field to fill in, where that is what is meant by the key. */
+function goOn(event: KeyboardEvent<HTMLElement>): void {
+  const { target } = event;
+  const key = keyOf(event);
+  const isOn = key === "Enter" || (key === "Tab" && !event.shiftKey);
+  if (!isOn || !(target instanceof HTMLInputElement || target instanceof HTMLTextAreaElement))
+    return;
+  if (!target.matches(FIELDS) || target.value === "") return;
+  const isOwn = target instanceof HTMLTextAreaElement || target.hasAttribute("aria-haspopup");
+  if (key === "Enter" && (isOwn || target.getAttribute("aria-invalid") === "true")) return;
+  const fields = [
+    ...(target.closest("[data-problems]")?.querySelectorAll<HTMLElement>(FIELDS) ?? []),
+  ];
+  const next = fields[fields.indexOf(target) + 1];
+  if (next === undefined) return;
+  event.preventDefault();
+  next.focus();
+}
+
+/** Fields for the missing values of a problem, which stay as long as somebody is in them. */
 function Values({ told }: { told: CheckedGroup }) {
+  const hold = use(HoldContext);
+  if (told.kind !== "fill-in") return null;
+  const onBlur = ({ currentTarget, relatedTarget }: FocusEvent) => {
+    if (!currentTarget.contains(relatedTarget)) hold(null);
+  };
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: hears what its fields do
+    <div data-fill-in onFocus={() => hold(told)} onBlur={onBlur} onKeyDown={goOn}>
+      <Fields told={told} />
+    </div>
+  );
+}
+
+/** Numbers of one thing stand in a row. */
+function Fields({ told }: { told: CheckedGroup }) {
   const { graph, mayEdit } = useEditorContext();
   const action = graph.actions.find(({ key }) => key === told.place);
-  if (!action || !mayEdit || told.kind !== "fill-in") return null;
+  if (!action || !mayEdit) return null;
   const open = action.inputs.filter(({ path }) => told.inputs.includes(path));
   if (open.length === 0) return null;
   if (open.some(({ path }) => path !== told.group)) {
@@ -142,17 +196,26 @@ const TITLES: Readonly<Record<ProblemKind, string>> = {
 };
 
 function Part({ kind, told }: { kind: ProblemKind; told: readonly CheckedGroup[] }) {
-  const here = told.filter((each) => each.kind === kind);
+  const [held, setHeld] = useState<Held | null>(null);
+  const open = told.filter((each) => each.kind === kind);
+  const here = withHeld(open, held);
+  const hold = (next: CheckedGroup | null) => {
+    const at = here.findIndex(({ id }) => id === next?.id);
+    const after = new Set(here.slice(at + 1).map(({ id }) => id));
+    setHeld(next && { told: next, after });
+  };
   if (here.length === 0) return null;
   return (
     <section className={style.part} data-kind={kind} aria-label={TITLES[kind]}>
       <h2>
-        {TITLES[kind]} <span className="tabular">{here.length}</span>
+        {TITLES[kind]} <span className="tabular">{open.length}</span>
       </h2>
       <ul className="list-reset stack gap-50">
-        {here.map((each) => (
-          <ProblemItem key={each.id} told={each} />
-        ))}
+        <HoldContext value={hold}>
+          {here.map((each) => (
+            <ProblemItem key={each.id} told={each} />
+          ))}
+        </HoldContext>
       </ul>
     </section>
   );
@@ -230,7 +293,7 @@ export function ProblemList({ problems, told, seq }: Props) {
   const flow = useMemo(() => dataFlowOf(graph), [graph]);
   if (!problems) return <p className={style.checked}>Checking …</p>;
   return (
-    <div className={style.list}>
+    <div className={style.list} data-problems>
       {told.every(({ kind }) => kind === "note") && (
         <p className={style.none}>
           <IconCircleCheck size={18} aria-hidden /> No problem found.
