@@ -94,11 +94,20 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
           style={{ stroke: outcomeColor[data.outcome], strokeWidth: data.lit ? 2.75 : 2 }}
         />
       )}
-      {data.lead && pill && <Pill {...{ id, data, line, pill }} selected={selected === true} />}
+      {data.lead && pill && (
+        <Pill
+          {...{ id, line, pill }}
+          data={line.lean ? leanData(data) : data}
+          selected={selected === true}
+        />
+      )}
       {data.lead && selected && <BendHandles arrow={id} bundle={data.bundle} line={line} />}
     </g>
   );
 });
+
+/** Return what a pill shows where there is room for outcomes and response only. */
+const leanData = (data: ArrowData): ArrowData => ({ ...data, mark: null, hand: null });
 
 interface BundleProps {
   id: string;

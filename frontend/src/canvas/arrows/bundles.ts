@@ -105,6 +105,8 @@ export function pillSizeOf(bundle: Bundle, marked: boolean, handed = false): Pil
   const glyphs = bundle.entry ? 0 : bundle.outcomes.length;
   if (glyphs === 0 && word === "" && !marked) return null;
   const said = word === "" ? 0 : word.length * LETTER + 3;
-  const width = EDGE + glyphs * GLYPH + said + (marked ? BADGE : 0) + (handed ? HAND : 0);
-  return { width: Math.ceil(width), height: PILL_HEIGHT };
+  const lean = EDGE + glyphs * GLYPH + said;
+  const more = (marked ? BADGE : 0) + (handed ? HAND : 0);
+  const size = { width: Math.ceil(lean + more), height: PILL_HEIGHT };
+  return more > 0 && lean > EDGE ? { ...size, lean: Math.ceil(lean) } : size;
 }

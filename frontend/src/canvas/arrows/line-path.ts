@@ -54,8 +54,9 @@ export function lineNow(known: RoutedLine | undefined, simple: RoutedLine): Rout
       ? known
       : { ...known, pill };
   const points = stretched(old, first, last, known.direction === "right" ? 0 : 1);
+  const lean = pill === simple.pill ? (simple.lean ?? false) : (known.lean ?? false);
   const { ends, docked, waypoints } = simple;
-  return points ? { ...known, ends, points, pill, docked, waypoints } : simple;
+  return points ? { ...known, ends, points, pill, docked, lean, waypoints } : simple;
 }
 
 const equal = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1];

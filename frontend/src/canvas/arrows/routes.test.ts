@@ -27,6 +27,16 @@ const scene = (
   ...{ direction, offset: gridOffset(cards, direction, null), cards, lines },
 });
 
+test.each([
+  [200, false],
+  [90, true],
+])("a pill with %i px of room shows the outcome; only its outcome: %s", (gap, lean) => {
+  const handed = { ...line("a", "b"), pill: { width: 68, height: 20, lean: 26 } };
+  const rows = [0, 90, -90].flatMap((y) => [card(`l${y}`, 0, y), card(`r${y}`, 160 + gap, y)]);
+  const given = scene(rows, [{ ...handed, source: "l0", target: "r0" }]);
+  expect(routed(given).lines.get("a>b")).toMatchObject({ lean, pill: expect.anything() });
+});
+
 test("in a graph that is laid out no line passes a card, lies on another, or meets a pill", () => {
   // In 3,406 such scenes two lines of one shared a piece (35 cards, seed 27, to the right).
   let sharing = 0;

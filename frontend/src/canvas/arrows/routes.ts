@@ -1,5 +1,5 @@
 /** Routes the lines of a scene: all of them, or only those near something that has moved. Pure. */
-import { type Dock, DockPlan } from "./docks";
+import { type Dock, DockPlan, leanOf } from "./docks";
 import { BLOCKED, FREE, NEAR, Raster } from "./raster";
 import { freeCells, Router, routeThrough, straightened } from "./router";
 import { BoxIndex, boxOf, type FlowBox, type Point, type Scene, STEP } from "./scene";
@@ -284,7 +284,8 @@ class Routing {
       const pill = dock.pill && middleOf(dock.pill, scene.direction);
       const waypoints = canvasPoints(waypointsOf(dock, scene), plan, scene);
       const { direction } = scene;
-      lines.set(id, { id, direction, ends, points, pill, docked, waypoints, simple: false });
+      const { lean } = dock;
+      lines.set(id, { id, direction, ends, points, pill, docked, lean, waypoints, simple: false });
       if (!docked && dock.line.pill) loose.push({ task, points });
     }
     this.placeLoose(loose, lines, raster);
@@ -303,18 +304,20 @@ class Routing {
     for (const { pill } of this.plan.docks) if (pill) taken.add(pill);
     for (const { task, points } of loose) {
       const line = lines.get(task.dock.line.id);
-      const size = task.dock.line.pill;
-      if (!line || !size) continue;
+      const whole = task.dock.line.pill;
+      if (!line || !whole) continue;
       this.mark(task, -1);
-      const boxAt = ([x, y]: Point) =>
-        boxOf({ x: x - size.width / 2, y: y - size.height / 2, ...size }, this.scene.direction);
-      for (const [cards, others] of LOOSE_GAPS) {
+      const sizes = whole.lean === undefined ? [whole] : [whole, leanOf(whole)];
+      const tries = sizes.flatMap((size) => LOOSE_GAPS.map((gaps) => [size, gaps] as const));
+      for (const [size, [cards, others]] of tries) {
+        const boxAt = ([x, y]: Point) =>
+          boxOf({ x: x - size.width / 2, y: y - size.height / 2, ...size }, this.scene.direction);
         const pill = [...places(points)].find(
           (at) => !taken.hits(boxAt(at), cards) && !raster.hasLine(boxAt(at), others),
         );
         if (!pill) continue;
         taken.add(boxAt(pill));
-        lines.set(line.id, { ...line, pill });
+        lines.set(line.id, { ...line, pill, lean: size !== whole });
         break;
       }
       this.mark(task, 1);

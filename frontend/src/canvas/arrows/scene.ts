@@ -5,9 +5,11 @@ import type { Direction } from "../../graph/model";
 export interface PillSize {
   readonly width: number;
   readonly height: number;
+  /** The width with nothing but outcomes and response, for where there is no room; absent if that is all. */
+  readonly lean?: number;
 }
 
-export interface Area extends PillSize {
+export interface Area extends Omit<PillSize, "lean"> {
   readonly x: number;
   readonly y: number;
 }

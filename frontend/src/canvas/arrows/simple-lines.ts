@@ -26,6 +26,8 @@ export interface RoutedLine {
   readonly pill: Point | null;
   /** The pill stands beside the card that the line leaves, and can move away from it a little. */
   readonly docked: boolean;
+  /** The pill has room for outcomes and response only. */
+  readonly lean?: boolean;
   /** Its waypoints on the grid; the line leaves out those that are blocked. */
   readonly waypoints: readonly Point[];
   /** True if the line was not routed, because its cards stand too close or too far apart. */
@@ -80,6 +82,7 @@ export function simpleLines(scene: Scene): Map<string, RoutedLine> {
           points: simplified(whole),
           pill,
           docked,
+          lean: dock.lean,
           waypoints: canvasPoints(waypoints, plan, scene),
           simple: true,
         },
