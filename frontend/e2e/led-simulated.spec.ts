@@ -115,9 +115,18 @@ test("a run asks people, on every page, and their first answer is its outcome", 
   await expect(asked).toContainText("Is the door open?", { timeout: 15_000 });
 
   // Whoever is asked sees it on the phone, on another page, and answers there.
-  await page.goto(product.url);
   await page.setViewportSize({ width: 360, height: 740 });
-  await page.getByRole("link", { name: /asks: .*Is the door open/ }).click();
+  const asks = page.getByRole("link", { name: /asks: .*Is the door open/ });
+  const isRead = async () => {
+    await expect(asks).toBeInViewport({ ratio: 1 });
+    expect((await asks.boundingBox())?.width).toBeGreaterThan(340);
+  };
+  await isRead();
+  await page.goto(product.url);
+  await isRead();
+  await expect(page.getByRole("link", { name: "Runs", exact: true })).toBeInViewport();
+  await asks.click();
+  await expect(asks).toBeHidden();
   await asked.getByRole("button", { name: "Yes" }).click();
   await expect(asked).toContainText("Which shelf?");
   await asked.getByRole("button", { name: "right" }).click();

@@ -4,15 +4,15 @@ import { IconBolt, IconHistory, IconMapOff, IconRobot, IconShare } from "@tabler
 import { memo, type ReactNode, useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
-import { openRuns } from "../api/live-socket";
+import { foreignGraphs, type LiveState, openRuns } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import type { ViewedThing } from "../api/view-links";
-import { MovesNowLine } from "../runs/moves-now";
 import { graphOnScreen } from "../runs/stop/stop-surroundings";
 import { Empty } from "../ui/empty";
-import { useStableCallback } from "../ui/hooks";
+import { useIsPhone, useStableCallback } from "../ui/hooks";
 import { boundedPart, lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { NAME_RANK, useNameColors } from "../ui/name-colors";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
 import style from "./page-frame.module.css";
@@ -50,15 +50,28 @@ const Account = memo(AccountMenu);
 const Sharing = memo(
   lazyPart(() => import("../account/share-dialog").then((part) => part.ShareDialog)),
 );
-const Moving = memo(MovesNowLine);
+const MovesNow = boundedPart(() => import("../runs/moves-now").then((part) => part.MovesNowLine), {
+  waiting: null,
+});
+
+const robotNamesIn = ({ engines }: LiveState): string[] =>
+  engines.flatMap(({ name, simulated }) => (simulated ? [] : [name]));
+
+/** Its code is loaded when something may move. */
+const Moving = memo(function Moving() {
+  const { now } = useLive();
+  useNameColors(NAME_RANK.robots, robotNamesIn(now));
+  return openRuns(now).length + foreignGraphs(now).length > 0 ? <MovesNow /> : null;
+});
 const Asked = boundedPart(() => import("../status/asked-line").then((part) => part.AskedLine), {
   waiting: null,
 });
 
 /** Its code is loaded when a run asks somebody. */
-const Asking = memo(function Asking() {
+const Asking = memo(function Asking({ below }: { below: boolean }) {
   const { now } = useLive();
-  return openRuns(now).some(({ questions }) => questions?.length) ? <Asked /> : null;
+  const some = openRuns(now).some(({ questions }) => questions?.length);
+  return some ? <Asked below={below} /> : null;
 });
 
 const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps) {
@@ -98,48 +111,52 @@ export function PageBar({ crumbs, status, actions, start, graph, run, at }: Prop
   const closeSharing = useStableCallback(() => setSharing(false));
   const ways = { tight: Boolean(start), beside: graph !== undefined };
   const { tight } = ways;
+  const isPhone = useIsPhone();
   return (
-    <TopBar
-      crumbs={crumbs}
-      status={
-        <>
-          {status}
-          <Moving />
-          <Asking />
-        </>
-      }
-      actions={
-        <>
-          {actions}
-          {at !== "actions" && <Way to="/actions" icon={IconBolt} name="Actions" {...ways} />}
-          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" {...ways} />}
-          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" {...ways} />}
-          {mayShare && (
-            <Button
-              variant="subtle"
-              color="gray"
-              px="sm"
-              aria-label="Share"
-              leftSection={<IconShare size={16} aria-hidden />}
-              className={`${style.way ?? ""} ${style.share ?? ""}`}
-              data-tight={tight || undefined}
-              onClick={share}
-            >
-              Share
-            </Button>
-          )}
-          {mayShare && (
-            <OverlayBoundary>
-              {sharing !== null && (
-                <Sharing opened={sharing} onClose={closeSharing} thing={thing} />
-              )}
-            </OverlayBoundary>
-          )}
-        </>
-      }
-      account={<Account onShare={mayShare ? share : null} onLeave={leave} />}
-      start={start}
-    />
+    <div className={style.top}>
+      <TopBar
+        crumbs={crumbs}
+        status={
+          <>
+            {status}
+            <Moving />
+            {!isPhone && <Asking below={false} />}
+          </>
+        }
+        actions={
+          <>
+            {actions}
+            {at !== "actions" && <Way to="/actions" icon={IconBolt} name="Actions" {...ways} />}
+            {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" {...ways} />}
+            {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" {...ways} />}
+            {mayShare && (
+              <Button
+                variant="subtle"
+                color="gray"
+                px="sm"
+                aria-label="Share"
+                leftSection={<IconShare size={16} aria-hidden />}
+                className={`${style.way ?? ""} ${style.share ?? ""}`}
+                data-tight={tight || undefined}
+                onClick={share}
+              >
+                Share
+              </Button>
+            )}
+            {mayShare && (
+              <OverlayBoundary>
+                {sharing !== null && (
+                  <Sharing opened={sharing} onClose={closeSharing} thing={thing} />
+                )}
+              </OverlayBoundary>
+            )}
+          </>
+        }
+        account={<Account onShare={mayShare ? share : null} onLeave={leave} />}
+        start={start}
+      />
+      {isPhone && <Asking below />}
+    </div>
   );
 }
 

@@ -1,6 +1,6 @@
 /** The panel on the right: properties of what is selected, JSON, problems. */
 import { Tabs } from "@mantine/core";
-import { IconMessageCircle, IconShieldCheck } from "@tabler/icons-react";
+import { IconAlertTriangle, IconMessageCircle, IconShieldCheck } from "@tabler/icons-react";
 import type { Problems } from "../api/graphs";
 import {
   type EditorContext,
@@ -102,8 +102,9 @@ function Properties() {
 function ProblemsTab({ told }: { told: readonly CheckedGroup[] }) {
   const { wrong, fillIn, warnings } = countsOf(told);
   return (
-    <span className="inline-row gap-30">
-      Problems
+    <span className={`inline-row gap-30 ${style.problems}`}>
+      <IconAlertTriangle size={15} aria-hidden className={style.sign} />
+      <span className={style.word}>Problems</span>
       {wrong > 0 && (
         <span className={style.count} data-kind="wrong">
           {wrong}

@@ -9,7 +9,7 @@ import { SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
 import { actionWords, placesOf } from "../status/level-places";
 import { knownRest, restWords } from "../status/rests";
-import { colorOfName, NAME_RANK, useNameColors } from "../ui/name-colors";
+import { colorOfName } from "../ui/name-colors";
 import { instant } from "../ui/times";
 import { isolated } from "../words/isolated";
 import style from "./moves-now.module.css";
@@ -24,7 +24,7 @@ function One({ moving }: { moving: Moving }) {
       ) : (
         <i style={{ background: colorOfName(moving.robot) }} aria-hidden />
       )}
-      <b>{moving.robot}</b> {moving.words}
+      <b>{moving.robot}</b> <span className={style.words}>{moving.words}</span>
     </>
   );
   const shared = { className: style.one, "data-kind": moving.kind };
@@ -37,13 +37,9 @@ function One({ moving }: { moving: Moving }) {
   );
 }
 
-const robotNamesIn = ({ engines }: LiveState): string[] =>
-  engines.flatMap(({ name, simulated }) => (simulated ? [] : [name]));
-
 export function MovesNowLine() {
   const { now } = useLive();
   const moving = useMemo(() => movesNow(now), [now]);
-  useNameColors(NAME_RANK.robots, robotNamesIn(now));
   if (moving.length === 0) return null;
   const all = moving.map(({ robot, words }) => `${isolated(robot)}: ${words}`).join(" · ");
   return (

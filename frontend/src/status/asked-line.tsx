@@ -1,13 +1,15 @@
-/** The line in the bar of every page with the questions that runs ask now, and a link there. */
+/** The line in or below the bar of every page with the questions that runs ask now, and a link there. */
 import { IconMessageQuestion } from "@tabler/icons-react";
-import { Link } from "wouter";
+import { Link, useLocation } from "wouter";
 import { openRuns } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMayAnswer } from "../api/questions";
 import { isolated } from "../words/isolated";
 import style from "./asked-line.module.css";
 
-export function AskedLine() {
+/** `below`: it has the width of the page, and is left out where the question itself is. */
+export function AskedLine({ below = false }: { below?: boolean }) {
+  const [at] = useLocation();
   const { now, runner } = useLive();
   const asked = openRuns(now).flatMap((run) =>
     (run.questions ?? []).map((question) => ({ run, question })),
@@ -20,9 +22,10 @@ export function AskedLine() {
   const [first] = mine;
   if (first === undefined) return null;
   const { run, question } = first;
+  if (below && at === `/runs/${run.id}`) return null;
   const more = mine.length > 1 ? ` and ${mine.length - 1} more` : "";
   return (
-    <span role="alert" className="min-w-0">
+    <span role="alert" className={style.alert} data-below={below || undefined}>
       <Link
         to={`/runs/${run.id}`}
         className={style.line}
@@ -30,10 +33,15 @@ export function AskedLine() {
         aria-label={`Run ${run.number} asks: ${isolated(question.text)}${more}`}
       >
         <IconMessageQuestion size={15} aria-hidden />
-        <span className="ellipsis">
+        <span className={style.words}>
           Asked: {question.text}
           {more}
         </span>
+        {below && (
+          <span className={style.answer} aria-hidden>
+            Answer
+          </span>
+        )}
       </Link>
     </span>
   );

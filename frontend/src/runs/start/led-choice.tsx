@@ -206,7 +206,7 @@ export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps
   const may = useMay("operate");
   const options = now.engines.map((robot) => {
     const why = whyOff(robot, may);
-    const player = robot.simulated ? "Simulator (nothing moves)" : isolated(robot.name);
+    const player = robot.simulated ? "Simulator, nothing moves" : isolated(robot.name);
     return {
       value: robot.name,
       label: why === "" ? player : `${player}: ${why}`,

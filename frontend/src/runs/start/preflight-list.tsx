@@ -32,7 +32,7 @@ const WAITING: Readonly<Record<string, string>> = {
   proof: "A stop can be proven",
   actions: "Its actions, with the same parameters",
   again: "It survives a start of this name",
-  quiet: "Nothing else runs",
+  quiet: "Nothing runs that was started elsewhere",
   others: "Nobody else starts things",
   actors: "Whose actions these are",
   courses: "It goes as expected",

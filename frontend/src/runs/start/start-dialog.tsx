@@ -557,28 +557,29 @@ export function StartDialog(props: Props) {
         taken={given.taken}
       />
       <ConfirmFirst looks={looks} />
-      {codes.length > 0 && (mayWait(looks) || !looks?.some(({ never }) => never)) && (
-        <Textarea
-          label="Why start anyway? It is recorded with the run."
-          value={reason}
-          maxLength={500}
-          autosize
-          minRows={2}
-          onChange={(event) => setReason(event.currentTarget.value)}
-        />
-      )}
-      {repeat === null && (
-        <QueueOffer
-          graph={graph}
-          wanted={sent}
-          looks={looks}
-          robots={engines}
-          obstacle={waitObstacle}
-          reason={reason}
-          onSent={onClose}
-        />
-      )}
       <footer className={style.foot}>
+        {codes.length > 0 && (mayWait(looks) || !looks?.some(({ never }) => never)) && (
+          <Textarea
+            label="Why start anyway? It is recorded with the run."
+            value={reason}
+            maxLength={500}
+            autosize
+            minRows={1}
+            className={style.way ?? ""}
+            onChange={(event) => setReason(event.currentTarget.value)}
+          />
+        )}
+        {repeat === null && (
+          <QueueOffer
+            graph={graph}
+            wanted={sent}
+            looks={looks}
+            robots={engines}
+            obstacle={waitObstacle}
+            reason={reason}
+            onSent={onClose}
+          />
+        )}
         <Exactly
           name={name}
           label={label}

@@ -383,7 +383,8 @@ def _quiet(view: EngineView, graph: Graph) -> Item:
         names = ", ".join(moving[:3]) if view.names_graphs else "a graph"
         text = f"{view.name} runs {names}, which nobody started from here."
         return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
-    return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {view.name}.")
+    text = f"Nothing runs on {view.name} that was started elsewhere."
+    return Item(code="quiet", verdict="passed", text=text)
 
 
 def _rest(view: EngineView) -> Item:
