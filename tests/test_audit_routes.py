@@ -338,6 +338,7 @@ def _runs(walk: Walk) -> None:
     client = walk.http["runner"]
     until("the run is over", lambda: client.get(f"/api/runs/{run}").json()["ended_at"])
     walk("runner", "patch", "/api/runs/{run}/marks", {"note": "odd"}, run=run)
+    walk("runner", "post", "/api/runs/{run}/notes", {"text": "odd"}, run=run)
     walk("runner", "post", "/api/runs/{run}/incident", {"reason": "odd"}, run=run)
     around = {"since": "2026-11-28T10:00:00Z", "until": "2026-11-28T12:00:00Z"}
     walk("editor", "post", "/api/audit/kept", {"run": run, **around})

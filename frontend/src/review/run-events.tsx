@@ -5,7 +5,7 @@ import { useMemo, useState } from "react";
 import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useCurrentName } from "../api/people";
-import type { ReplayMark } from "../api/review";
+import type { ReplayMark, RunNote } from "../api/review";
 import { exportUrl, useRawEvents } from "../api/review";
 import { type Run, runPlace } from "../api/runs";
 import { placesOf, wayWords } from "../status/level-places";
@@ -22,6 +22,7 @@ import { clock, instant } from "../ui/times";
 import { isolated } from "../words/isolated";
 import { markText } from "./replay-controls";
 import style from "./run-events.module.css";
+import { NoteHere, noteText } from "./run-notes";
 
 interface Happening {
   at: number;
@@ -67,6 +68,7 @@ export function eventLines(
   version: string,
   marks: readonly ReplayMark[] = [],
   by: string = authorName(run.author),
+  notes: readonly RunNote[] = [],
 ): Happening[] {
   const all: Happening[] = [];
   const start = instant(run.started_at);
@@ -124,6 +126,10 @@ export function eventLines(
     if (at === null || !TOLD.has(mark.kind)) continue;
     all.push({ at, tone: "stopped", name: null, fact: null, text: markText(mark) });
   }
+  for (const note of notes) {
+    const at = instant(note.moment);
+    if (at !== null) all.push({ at, tone: "run", name: null, fact: null, text: noteText(note) });
+  }
   for (const alarm of run.alarms) {
     const at = instant(alarm.at);
     if (at !== null) all.push({ at, tone: "error", name: null, fact: null, text: alarm.text });
@@ -146,12 +152,15 @@ export function eventLines(
 }
 
 interface Props {
+  runner: string | undefined;
   run: Run;
   version: string;
   /** The action that is chosen, as the run calls it. */
   selected: string | null;
   onPick: (fact: string | null) => void;
   marks: readonly ReplayMark[];
+  /** What people wrote for moments of the run. */
+  notes: readonly RunNote[];
   /** The moment at which the replay stands, ms; null at the end. */
   at: number | null;
   onSeek: (at: number) => void;
@@ -162,7 +171,7 @@ const SHOWN = 400;
 function Line(
   props: { event: Happening; start: number; first: boolean } & Omit<
     Props,
-    "run" | "version" | "marks"
+    "runner" | "run" | "version" | "marks" | "notes"
   >,
 ) {
   const { event, start, first, selected, onPick, at, onSeek } = props;
@@ -197,11 +206,14 @@ function Line(
 }
 
 export function RunEvents(props: Props) {
-  const { run, version, marks, selected } = props;
+  const { runner, run, version, marks, notes, selected } = props;
   const [search, setSearch] = useState("");
   const start = instant(run.started_at) ?? 0;
   const by = useCurrentName(run.author);
-  const all = useMemo(() => eventLines(run, version, marks, by), [run, version, marks, by]);
+  const all = useMemo(
+    () => eventLines(run, version, marks, by, notes),
+    [run, version, marks, by, notes],
+  );
   const wanted = search.trim().toLowerCase();
   const found = all.filter(
     (event) => wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted),
@@ -209,14 +221,17 @@ export function RunEvents(props: Props) {
   const shown = found.slice(-SHOWN);
   return (
     <>
-      <TextInput
-        className={style.search ?? ""}
-        size="xs"
-        aria-label="Search events"
-        placeholder="Search events"
-        value={search}
-        onChange={(event) => setSearch(event.currentTarget.value)}
-      />
+      <div className={style.search}>
+        <TextInput
+          className="flex-1"
+          size="xs"
+          aria-label="Search events"
+          placeholder="Search events"
+          value={search}
+          onChange={(event) => setSearch(event.currentTarget.value)}
+        />
+        <NoteHere runner={runner} run={run} at={props.at} />
+      </div>
       {found.length > shown.length && (
         <p className={style.more}>{found.length - shown.length} earlier ones are not listed.</p>
       )}

@@ -10,7 +10,13 @@ import { errorText } from "../api/http";
 import { CONDUCTED } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
-import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../api/review";
+import {
+  type ReplayMark,
+  type RunNote,
+  useReplayData,
+  useRunNotes,
+  useRunsOfSameStart,
+} from "../api/review";
 import { type Run, useRun } from "../api/runs";
 import { EditorStore, EditorStoreProvider } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
@@ -48,6 +54,7 @@ import { hasRunMenu, RunCanvasMenu, type RunCanvasPlace } from "./run-canvas-men
 import { RawEvents, RunEvents } from "./run-events";
 import { PinRun, RunFacts, RunNotes, useVersionLabel } from "./run-facts";
 import type { RepeatActions } from "./run-menu";
+import { noteSigns } from "./run-notes";
 import style from "./run-page.module.css";
 import { RunParameters } from "./run-parameters";
 import { RunPrint } from "./run-print";
@@ -64,6 +71,7 @@ export interface RunBarParts {
 }
 
 const NO_MARKS: readonly ReplayMark[] = [];
+const NO_NOTES: readonly RunNote[] = [];
 
 interface Props {
   id: string;
@@ -176,13 +184,15 @@ interface AboutRunProps {
   replay: ReplayCursor;
   label: string;
   marks: readonly ReplayMark[];
+  notes: readonly RunNote[];
   /** The chosen action as the run calls it. */
   selected: string | null;
   onSelect: (fact: string | null) => void;
 }
 
 /** Parameters, events, notes and raw messages of a run, beside the canvas. */
-function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: AboutRunProps) {
+function AboutRun(props: AboutRunProps) {
+  const { runner, newest, replay, label, marks, notes, selected, onSelect } = props;
   const by = useCurrentName(newest.author);
   return (
     <aside className={style.side} aria-label="About the run">
@@ -196,11 +206,13 @@ function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: 
         </Tabs.List>
         <Tabs.Panel value="events" className="fill-y overflow-y-auto">
           <RunEvents
+            runner={runner}
             run={newest}
             version={label}
             selected={selected}
             onPick={onSelect}
             marks={marks}
+            notes={notes}
             at={replay.at}
             onSeek={replay.seek}
           />
@@ -283,6 +295,7 @@ interface RunTimelineProps {
   mates: readonly Track[];
   range: TimeRange | null;
   onRange: (range: TimeRange | null) => void;
+  notes: readonly RunNote[];
 }
 
 /** Every visit, and the controls of the replay. */
@@ -300,7 +313,11 @@ function RunTimeline(props: RunTimelineProps) {
   );
   const silent = instant(newest.unknown_since);
   const until = instant(newest.ended_at) ?? silent ?? replay.end;
-  const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
+  const { notes } = props;
+  const signs = useMemo(
+    () => [...timelineSignsOf(replayData), ...noteSigns(notes)],
+    [replayData, notes],
+  );
   const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
   return (
     <section className={style.strip} aria-label="Timeline">
@@ -363,12 +380,14 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const [menu, setMenu] = useState<RunCanvasPlace | null>(null);
   const isMenuHere = !past && level.levels.length === 0;
   const openMenu = useStableCallback((id: string, screen: Position) => {
-    if (!isMenuHere || !hasRunMenu(newest, level.graph, id)) return;
+    if (!isMenuHere || !hasRunMenu(newest, level.graph, id)) return false;
     if (level.graph.actions.some((each) => each.key === id)) select(id);
     else if (isLedNow) pickArrow(id);
     setMenu({ id, screen });
+    return true;
   });
   const replayData = useReplayData(runner, newest.id, 0, true).data;
+  const notes = useRunNotes(runner, newest.id).data ?? NO_NOTES;
   const label = useVersionLabel(newest);
   const show = (at: number, fact: string | null) => {
     replay.seek(at);
@@ -423,6 +442,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           mates={mates}
           range={range}
           onRange={setRange}
+          notes={notes}
         />
         <AboutRun
           runner={runner}
@@ -430,6 +450,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           replay={replay}
           label={label}
           marks={replayData?.marks ?? NO_MARKS}
+          notes={notes}
           selected={level.fact}
           onSelect={level.pick}
         />

@@ -95,6 +95,7 @@ review: Final = Table(
     Column("note", Text, nullable=False),
     Column("words", Text, nullable=False),
     Column("summed", Boolean(create_constraint=False), nullable=False),
+    Column("remarks", Text, nullable=False, server_default=""),
 )
 #: The words of runs, in small letters, and which runs hold which: `number` is theirs.
 word: Final = Table(

@@ -1602,6 +1602,15 @@ export interface RunnerApi {
         moved: boolean;
     };
     /**
+     * NoteText
+     * @description A note for a moment of a run. `moment`: without it, now; for a run that is over, its end.
+     */
+    NoteText: {
+        text: string;
+        /** @default null */
+        moment?: string | null;
+    };
+    /**
      * OpenQueueRequest
      * @description Opens the closed queue of a robot again after a look. `closing`: that of the queue, as the person
      *     saw it.
@@ -2576,6 +2585,18 @@ export interface RunnerApi {
         /** @enum {string} */
         type: "run";
         run: RunnerApi["RunShown"];
+    };
+    /**
+     * RunNote
+     * @description A note that a person wrote for a moment of a run. `at`: when it was written.
+     */
+    RunNote: {
+        /** Format: date-time */
+        moment: string;
+        text: string;
+        author: RunnerApi["Author"];
+        /** Format: date-time */
+        at: string;
     };
     /**
      * RunPoint
@@ -3754,6 +3775,10 @@ export interface RunnerPaths {
     "/api/runs/{run}/marks": {
         get: RunnerOperations["getMarks"];
         patch: RunnerOperations["setMarks"];
+    };
+    "/api/runs/{run}/notes": {
+        get: RunnerOperations["listRunNotes"];
+        post: RunnerOperations["addRunNote"];
     };
     "/api/runs/{run}/script": {
         get: RunnerOperations["getScript"];
@@ -5168,6 +5193,39 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["RunMarks"];
+                };
+            };
+        };
+    };
+    listRunNotes: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunNote"][];
+                };
+            };
+        };
+    };
+    addRunNote: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["NoteText"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["RunNote"][];
                 };
             };
         };

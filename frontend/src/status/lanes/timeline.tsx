@@ -75,6 +75,8 @@ export interface TimeSign {
   at: number;
   tone: Tone;
   text: string;
+  /** True for what a person wrote there later. */
+  note?: boolean;
 }
 
 /** A time of which nothing is known, ms. */
@@ -156,6 +158,7 @@ function Across({ axis, cursor, goes, silentSince, signs, gaps }: AcrossProps) {
           <i
             key={`${sign.at} ${sign.text}`}
             className={style.sign}
+            data-note={sign.note || undefined}
             title={sign.text}
             style={{ left: `${at(sign.at)}%`, color: toneColor[sign.tone] }}
           />

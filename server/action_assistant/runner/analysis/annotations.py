@@ -58,6 +58,21 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
     marks: Marks
 
 
+class Noted(msgspec.Struct, frozen=True):
+    """A person wrote a note at a moment of a run. `at`: when it was written; `moment`: the moment
+    of the run; both in microseconds UTC. Notes are only added."""
+
+    kind: ClassVar[str] = "run.noted.v1"
+
+    at: int
+    author: Author
+    moment: int
+    text: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
+
+
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The totals of one action of a run that is over. `visits`: how often it ran, with `at_least`
     perhaps more often. `results`: the number of visits by known result, without those whose result
@@ -139,9 +154,9 @@ def is_about(stream: str) -> bool:
     return stream.startswith(_PREFIX)
 
 
-def draft(event: Marked | SummedUp | RunArchived | IncidentKept) -> Draft:
+def draft(event: Marked | Noted | SummedUp | RunArchived | IncidentKept) -> Draft:
     """Encode an annotation of a run for the journal."""
-    author = event.author.id if isinstance(event, Marked | IncidentKept) else ""
+    author = event.author.id if isinstance(event, Marked | Noted | IncidentKept) else ""
     return draft_of(event, author)
 
 
@@ -193,6 +208,8 @@ def fold(event: Event) -> Sequence[Executable]:
     match event.kind:
         case Marked.kind:
             return _mark(run, msgspec.json.decode(event.body, type=Marked).marks)
+        case Noted.kind:
+            return _note(run, msgspec.json.decode(event.body, type=Noted).text)
         case SummedUp.kind:
             return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
         case RunArchived.kind:
@@ -213,6 +230,12 @@ def _mark(run: str, marks: Marks) -> Sequence[Executable]:
         if rows:
             statements.append(insert(run_label).values(rows))
     return statements
+
+
+def _note(run: str, text: str) -> Sequence[Executable]:
+    first = _review(run, {})
+    added = update(review).where(review.c.run == run)
+    return (first, added.values(remarks=review.c.remarks + "\n" + text), *holds(run, text))
 
 
 def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
@@ -257,6 +280,8 @@ def _archive(run_id: str, archived: RunArchived) -> Sequence[Executable]:
 def _review(run: str, fields: Mapping[str, object]) -> Executable:
     blank: dict[str, object] = {"pinned": False, "note": "", "words": "", "summed": False}
     statement = upsert(review).values(run=run, **{**blank, **fields})
+    if not fields:
+        return statement.on_conflict_do_nothing()
     return statement.on_conflict_do_update(index_elements=["run"], set_=dict(fields))
 
 

@@ -25,8 +25,8 @@ from action_assistant.runner.archives.raw_messages import RawMessages
 from action_assistant.runner.archives.retention import SweepResult
 from action_assistant.runner.review import audit_facts
 from action_assistant.runner.review.incident import IncidentRequest, window
-from action_assistant.runner.review.service import RunMarks
-from action_assistant.runner.review.stored_runs import CauseShown, Format, StoredRuns
+from action_assistant.runner.review.service import NoteText, RunMarks
+from action_assistant.runner.review.stored_runs import CauseShown, Format, RunNote, StoredRuns
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.start.admission import decoded
@@ -144,6 +144,28 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         return await services.review_service.mark(run, data, author_of(request))
 
     @get(
+        "/api/runs/{run:str}/notes",
+        summary="The notes that people wrote for moments of a run",
+        operation_id="listRunNotes",
+        guards=[Needs("see")],
+    )
+    async def notes(run: str) -> Response[list[RunNote]]:
+        await services.control.find(run)
+        return json_of(await services.worker_queries.text(StoredRuns.notes, run), list[RunNote])
+
+    @post(
+        "/api/runs/{run:str}/notes",
+        summary="Write a note for a moment of a run; notes are only added",
+        operation_id="addRunNote",
+        guards=[Needs("edit")],
+    )
+    async def note(run: str, data: NoteText, request: _Asking) -> Response[list[RunNote]]:
+        found = await services.control.find(run)
+        await services.review_service.note(found, data, author_of(request))
+        found_notes = await services.worker_queries.text(StoredRuns.notes, run)
+        return json_of(found_notes, list[RunNote])
+
+    @get(
         "/api/runs/{run:str}/script",
         summary="The course of a run, as a script for the simulator",
         operation_id="getScript",
@@ -205,7 +227,10 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         text = await services.worker_queries.text(StoredRuns.raw, run, here, utc_us())
         return json_of(text, RawMessages)
 
-    return [film, found_causes, umrf, marks, mark, script, fit, export, raw, _incident(services)]
+    return [
+        *(film, found_causes, umrf, marks, mark, notes, note, script, fit, export, raw),
+        _incident(services),
+    ]
 
 
 def _incident(services: RunnerServices) -> ControllerRouterHandler:
@@ -238,13 +263,14 @@ def _incident(services: RunnerServices) -> ControllerRouterHandler:
 
 async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
     """Yield the stored events of a run as lines of JSON in pages, then those of its pieces, if it
-    is led. `page`: its first page, which ends with event number `seq`."""
+    is led, and the notes at its moments. `page`: its first page, which ends with event number `seq`."""
     for each in (run, *await queries.value(StoredRuns.pieces, run)):
         if each != run:
             seq, page = await queries.value(StoredRuns.lines, each, 0)
         while page:
             yield page
             seq, page = await queries.value(StoredRuns.lines, each, seq)
+    yield await queries.value(StoredRuns.note_lines, run)
 
 
 def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:

@@ -99,6 +99,7 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "run.breakpoints_set.v1": ("starts", "set the breakpoints of {run}"),
     "run.released.v1": ("starts", "let the held {run} go on"),
     "run.marked.v1": ("starts", "marked {run}"),
+    "run.noted.v1": ("starts", "wrote a note at a moment of {run}"),
     "run.incident_kept.v1": ("starts", "keeps {run} as an incident"),
     "expectation.saved.v1": ("starts", "saved the expected course {name}"),
     "expectation.retired.v1": ("starts", "removed the expected course {name}"),

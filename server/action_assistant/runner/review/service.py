@@ -1,12 +1,14 @@
 """The review of runs: marks of people, examples, expected courses, and the loops that sum runs up."""
 
 from collections.abc import Callable, Sequence
+from datetime import datetime
+from typing import Annotated
 
 import anyio
 import msgspec
 from sqlalchemy import select
 
-from action_assistant.errors import Conflict, NotFound
+from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.archives import examples
@@ -18,6 +20,7 @@ from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sight import Unseen
+from action_assistant.runner.runs.views import microseconds
 from action_assistant.schema.runner_tables import expectation, review, run_label
 
 
@@ -27,6 +30,13 @@ class RunMarks(msgspec.Struct, frozen=True):
     pinned: bool
     note: str
     labels: list[str]
+
+
+class NoteText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A note for a moment of a run. `moment`: without it, now; for a run that is over, its end."""
+
+    text: Annotated[str, msgspec.Meta(min_length=1, max_length=2_000, pattern=r"\S")]
+    moment: datetime | None = None
 
 
 class ReviewService:
@@ -70,6 +80,20 @@ class ReviewService:
         marked = annotations.Marked(self._clock_us(), author, marks)
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
+
+    async def note(self, run: Run, given: NoteText, author: Author) -> None:
+        """Store a note at a moment of `run` in the name of `author`. Raise BadInput if the run was
+        not there at that moment, Unavailable if the journal cannot be written."""
+        now = self._clock_us()
+        last = now if run.ended_at is None else run.ended_at
+        moment = last if given.moment is None else microseconds(given.moment)
+        if run.ended_at is None:
+            moment = min(moment, now)  # the clock of a page may be a little ahead
+        if not run.requested_at <= moment <= last:
+            text = "A note is for a moment from the request of the run to its end."
+            raise BadInput(text, where={"path": "/moment"})
+        noted = annotations.Noted(now, author, moment, given.text.strip())
+        await self._journal.append(annotations.stream_about(run.id), [annotations.draft(noted)])
 
     async def keep_incident(self, run_id: str, reason: str, author: Author) -> None:
         """Keep a run as an incident, so that it is never archived. Raise NotFound if there is no such

@@ -73,6 +73,15 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
     author: Author | None
 
 
+class RunNote(msgspec.Struct, frozen=True):
+    """A note that a person wrote for a moment of a run. `at`: when it was written."""
+
+    moment: datetime
+    text: str
+    author: Author
+    at: datetime
+
+
 class HistoryEvent(msgspec.Struct, frozen=True):
     """One stored event, for programs that follow a run."""
 
@@ -378,6 +387,26 @@ class StoredRuns:
         if not events and not after:
             raise NotFound("There is no such run.")
         return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
+
+    async def notes(self, run_id: str) -> list[RunNote]:
+        """Return the notes at moments of a run, in the order of the moments. Raise Unavailable if the
+        journal cannot be read."""
+        events = await self._noted(run_id)
+        noted = [msgspec.json.decode(each.body, type=annotations.Noted) for each in events]
+        found = [
+            RunNote(views.time(each.moment), each.text, each.author, views.time(each.at))
+            for each in noted
+        ]
+        return sorted(found, key=lambda note: (note.moment, note.at))
+
+    async def note_lines(self, run_id: str) -> bytes:
+        """Return the notes at moments of a run as lines of JSON, in the order in which they were
+        written. Raise Unavailable if the journal cannot be read."""
+        return b"".join(exports.lines(run_id, await self._noted(run_id)))
+
+    async def _noted(self, run_id: str) -> list[Event]:
+        about = await self._journal.read(annotations.stream_about(run_id))
+        return [each for each in about if each.kind == annotations.Noted.kind]
 
     async def pieces(self, run_id: str) -> list[str]:
         """Return the ids of the pieces of a led run, in the order in which they were sent.

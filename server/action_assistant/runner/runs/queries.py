@@ -260,7 +260,8 @@ def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
         named = run.c.author_name.icontains(wanted.person, autoescape=True)
         yield or_(run.c.author_id == wanted.person, named)
     if wanted.text is not None:
-        places = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
+        said = (review.c.words, review.c.note, review.c.remarks)
+        places = (run.c.graph_name, run.c.engine, run.c.author_name, *said)
         found = (each.icontains(wanted.text, autoescape=True) for each in places)
         robots = _robots()
         named = robots.c.value.icontains(wanted.text, autoescape=True)

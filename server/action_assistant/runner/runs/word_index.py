@@ -54,7 +54,8 @@ def index_some(connection: Connection, most: int) -> bool:
     """Index the words of at most `most` runs that are marked as not indexed, the newest first, in
     the transaction of `connection`. Return whether any run was indexed; False means that none is
     left."""
-    texts = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
+    said = (review.c.words, review.c.note, review.c.remarks)
+    texts = (run.c.graph_name, run.c.engine, run.c.author_name, *said)
     chosen = (
         select(unindexed_run.c.number, run.c.id, *texts)
         .outerjoin_from(unindexed_run, run, run.c.number == unindexed_run.c.number)
