@@ -28,8 +28,11 @@ interface Props {
   onSelect?: (key: Key | null) => void;
   /** Called with the id of a relation; without it arrows cannot be chosen. */
   onSelectArrow?: ((id: string) => void) | undefined;
-  /** Called with the id of an action or relation whose menu is wanted, and the place for it. */
-  onMenu?: ((id: string, screen: Position) => void) | undefined;
+  /**
+   * Called with the id of an action or relation whose menu is wanted, and the place for it. Returns
+   * whether it has one: else a long press counts as a click.
+   */
+  onMenu?: ((id: string, screen: Position) => boolean) | undefined;
   /** Distinguishes several canvases on one page. */
   id?: string;
   /** Another canvas moves its view, so it does not fit the graph by itself. */
@@ -64,8 +67,7 @@ export function GraphView(props: Props) {
   const { onMenu } = props;
   const press = useMenuPress((screen) => {
     const id = nodeAt(screen) ?? arrowAt(screen);
-    if (id !== null) onMenu?.(id, screen);
-    return id !== null;
+    return id !== null && (onMenu?.(id, screen) ?? false);
   });
   const [lines] = useState(() => new LineStore());
   useEffect(() => lines.show(sceneOf(graph, options, lines.offset)), [lines, graph, options]);

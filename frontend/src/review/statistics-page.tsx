@@ -150,16 +150,24 @@ function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
               <th scope="row">
                 <ActionWay action={action} />
               </th>
-              <td className={style.number}>{visitCount(action)}</td>
-              <td>
-                <ResultBar action={action} />
+              <td className={style.number} data-column="Visits">
+                {visitCount(action)}
               </td>
               <td className={style.wide}>
+                <ResultBar action={action} />
+              </td>
+              <td className={style.spreads}>
                 <SpreadBar action={action} most={most} />
               </td>
-              <td className={style.number}>{seconds(action.spans.p50)}</td>
-              <td className={style.number}>{seconds(action.spans.p90)}</td>
-              <td className={style.number}>{seconds(action.spans.longest)}</td>
+              <td className={style.number} data-column="Median">
+                {seconds(action.spans.p50)}
+              </td>
+              <td className={style.number} data-column="90 %">
+                {seconds(action.spans.p90)}
+              </td>
+              <td className={style.number} data-column="Longest">
+                {seconds(action.spans.longest)}
+              </td>
             </tr>
           ))}
         </tbody>

@@ -199,7 +199,8 @@ export class DockPlan {
 
   private endOf(box: FlowBox & { key: string }): End {
     const side = box.v1 - box.v0;
-    const inset = Math.min(12, side * 0.2);
+    // Two lines that enter a low end, as the exit is, find two rows wherever the grid lies.
+    const inset = Math.min(12, side * 0.2, Math.max(2, (side - 2 * STEP) / 2));
     const row = (v: number) => (v - this.offset) / STEP;
     const [low, high] = [Math.ceil(row(box.v0 + inset)), Math.floor(row(box.v1 - inset))];
     if (low <= high) return { box, low, high };

@@ -82,6 +82,18 @@ test("cards anywhere, 32 px apart: no line passes one, no pill lies on a card, p
   expect(walledIn).toBeLessThanOrEqual(2);
 });
 
+test("two lines to the exit are apart, wherever the grid lies when the second one is drawn", () => {
+  for (let offset = 0; offset < STEP; offset += 1) {
+    const exit = { key: "exit", x: 400, y: 112, width: 84, height: 32 };
+    const cards = [card("a", 0, 0), card("b", 0, 180), exit];
+    const given = { ...scene(cards, [line("a", "exit"), line("b", "exit")]), offset };
+    const known = routed({ ...given, lines: given.lines.slice(0, 1) }).ways;
+    const { lines } = routed(given, known);
+    const ends = [...lines.values()].map(({ points }) => String(points.at(-1)));
+    expect([offset, new Set(ends).size]).toEqual([offset, 2]);
+  }
+});
+
 test("the same scene has the same lines", () => {
   fc.assert(
     fc.property(seed, fc.constantFrom(...DIRECTIONS), (seed, direction) => {
