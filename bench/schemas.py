@@ -3,6 +3,7 @@
 
 Fails if an answer is a server error. `postgres` starts a server of it for the editor, which alone is
 asked then (`make soak ARGS=schemas-postgres`); `runner` asks the runner alone.
+Where pyarrow is not installed, one answer is a 503 that is meant: Parquet is not available.
 """
 
 import contextlib

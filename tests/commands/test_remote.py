@@ -63,6 +63,12 @@ def imported(product: Product, file: str) -> str:
     return answer.stdout.split()[0]
 
 
+def test_an_empty_list_of_people_says_how_one_is_invited(product: Product) -> None:
+    listed = product.cli("people", "list")
+    assert (listed.returncode, listed.stdout) == (0, "")
+    assert listed.stderr == "nobody was invited yet: `people invite ROLE` makes a link\n"
+
+
 def test_a_file_comes_back_with_the_same_meaning(product: Product, files: dict[str, str]) -> None:
     graph = imported(product, files["graph"])
     assert graph in product.cli("graphs").stdout

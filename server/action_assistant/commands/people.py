@@ -1,6 +1,7 @@
 """`people`: persons, their links, and links of groups; `link`: the owner's own."""
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Final, get_args
@@ -109,8 +110,10 @@ def _list(options: argparse.Namespace) -> int:
             return 0
         from action_assistant.editor.api.invitations import Sharing
 
-        sharing = decoded(answer, Sharing)
-        for person in _members(server).people:
+        sharing, people = decoded(answer, Sharing), _members(server).people
+        if not people and not sharing.invitations:
+            print("nobody was invited yet: `people invite ROLE` makes a link", file=sys.stderr)
+        for person in people:
             _show_person(person, sharing.origins)
         for each in sharing.invitations:
             _show(sharing.origins, each)
