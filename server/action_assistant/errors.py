@@ -10,6 +10,7 @@
     │   └── WrongOrigin             403
     ├── NotFound                    404  no such thing
     ├── Conflict                    409  the thing is not in a state that allows it
+    │   └── Overtaken               409  it is another one by now; the same request may be sent again
     ├── TooLarge                    413  over a stated limit
     ├── TooMany                     429  too often
     ├── Misrouted                   502  a proxy sends requests of the other process here
@@ -105,6 +106,12 @@ class Conflict(Refused):
     status = 409
 
 
+class Overtaken(Conflict):
+    """The object has changed since the request was worked out; nothing was done, and it may be sent again."""
+
+    title = "Others were faster"
+
+
 class TooLarge(Refused):
     """The input is over a stated limit of size."""
 
@@ -153,8 +160,10 @@ class NewerSchema(CannotStart):
 
 
 class RequestRefused(Exception):
-    """A server refused the request of a command. `status`: the HTTP status; 0 if no request was sent."""
+    """A server refused the request of a command. `status`: the HTTP status; 0 if no request was sent.
+    `kind`: the `type` of the refusal, if it names one."""
 
-    def __init__(self, why: str, status: int = 0) -> None:
+    def __init__(self, why: str, status: int = 0, kind: str = "") -> None:
         super().__init__(why)
         self.status = status
+        self.kind = kind

@@ -3,9 +3,16 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import httpx
+import pytest
+
+from action_assistant.editor.app import create_app
+from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.settings import EditorSettings
+from support.product import TOKEN
 
 URL: Final = "http://127.0.0.1:8000"
 
@@ -77,3 +84,29 @@ class Socket:
         """Leave, and wait until the editor has noticed."""
         self._to_app.put_nowait({"type": "websocket.disconnect", "code": 1000})
         await self._served
+
+
+class EditorHere(NamedTuple):
+    """A running editor: the application that its server would serve, and what stands behind it."""
+
+    app: Any
+    services: EditorServices
+
+
+@asynccontextmanager
+async def editor_here(data: Path) -> AsyncIterator[EditorHere]:
+    """Run an editor whose token is that of tests."""
+    found: list[EditorServices] = []
+    opened = EditorState.open
+
+    def opens(state: EditorState, services: EditorServices) -> None:
+        found.append(services)
+        opened(state, services)
+
+    database = f"sqlite:///{data / 'editor.db'}"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
+        patch.setattr(EditorState, "open", opens)
+        app = create_app(EditorSettings(data=data, database=database, port=8000, limits=False))
+        async with lifespan(app):
+            yield EditorHere(app, found[0])

@@ -146,8 +146,16 @@ def request(client: "httpx.Client", method: str, path: str, **body: Any) -> "htt
             "Is it running? Start it with `action-assistant serve`."
         ) from error
     if answer.is_error:
-        raise RequestRefused(sentence(answer), answer.status_code)
+        raise RequestRefused(sentence(answer), answer.status_code, _kind(answer))
     return answer
+
+
+def _kind(answer: "httpx.Response") -> str:
+    """Return the type of a refusal; an empty text if the body is no refusal of this program."""
+    try:
+        return str(answer.json()["type"])
+    except (ValueError, KeyError, TypeError):
+        return ""
 
 
 def sentence(answer: "httpx.Response") -> str:

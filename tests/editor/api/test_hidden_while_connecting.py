@@ -8,13 +8,11 @@ from typing import Any
 import httpx
 import pytest
 
-from action_assistant.editor.app import create_app
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
-from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.roles import Role
-from editor.in_process import URL, Socket, browser, lifespan
+from editor.in_process import URL, Socket, browser, editor_here
 from editor.process import BEARER
 from support.product import TOKEN
 
@@ -25,13 +23,10 @@ HIDDEN = {"rule": {"readers": [], "editors": []}}
 
 
 @pytest.fixture
-async def app(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
+async def app(tmp_path: Path) -> AsyncIterator[Any]:
     """An editor in this process."""
-    monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
-    database = f"sqlite:///{tmp_path / 'editor.db'}"
-    app = create_app(EditorSettings(data=tmp_path, database=database, port=8000, limits=False))
-    async with lifespan(app):
-        yield app
+    async with editor_here(tmp_path) as here:
+        yield here.app
 
 
 @pytest.fixture

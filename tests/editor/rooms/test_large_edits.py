@@ -12,7 +12,7 @@ from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Replica
 from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.errors import Refused
+from action_assistant.errors import Overtaken, Refused
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, settle
@@ -83,6 +83,32 @@ async def test_a_large_edit_is_one_event_and_no_large_call(
         (first, second) = await journal.read(STREAM)
         assert first.body == update
         assert (second.author, second.seq) == ("ada", 2)
+        await rooms.close()
+    finally:
+        await journal.close()
+
+
+async def test_a_large_edit_that_others_overtook_is_not_even_tried(tmp_path: Path) -> None:
+    journal = await Journal.open(
+        f"sqlite:///{tmp_path / 'editor.db'}", branch="editor", fold=nothing
+    )
+    tried = list[object]()
+
+    async def trial(work: Any, *args: Any) -> Any:
+        tried.append(work)
+        return await aside(work, *args)
+
+    try:
+        rooms = Rooms(journal, linger=60, window=0, run_in_worker=aside, tried=trial)
+        ada = Client("ada")
+        async with rooms.enter(STREAM) as room:
+            ada.join(room)
+            ada.map["a"] = "1"
+            await settle(ada)
+            with pytest.raises(Overtaken):
+                await room.submit(large_update(), "server", 0)
+            assert tried == []
+            assert await room.submit(large_update(), "server", 1) == 2
         await rooms.close()
     finally:
         await journal.close()

@@ -13,7 +13,7 @@ from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.editor.rooms.member import WAITING_FRAMES
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.errors import Unavailable
+from action_assistant.errors import Overtaken, Unavailable
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, bodies, settle, updates
@@ -126,6 +126,28 @@ async def test_the_server_s_own_edit_hears_when_it_cannot_be_stored(
             await room.submit(update, "server")
         with pytest.raises(Unavailable):
             await room.read(lambda _, seq: seq)
+
+
+async def test_an_edit_with_an_expected_change_is_the_first_one_after_it_or_none(
+    rooms: Rooms, gate: Gate
+) -> None:
+    one, two, three = updates(("a", "1"), ("b", "2"), ("c", "3"))
+    async with rooms.enter(STREAM) as room:
+        gate.open.clear()
+        # Of two in one batch, each gets its own number; nothing that waits is overlooked.
+        first = asyncio.create_task(room.submit(one, "server", 0))
+        behind = asyncio.create_task(room.submit(two, "server"))
+        late = asyncio.create_task(room.submit(three, "server", 0))
+        await asyncio.sleep(0)
+        gate.open.set()
+        assert (await first, await behind) == (1, 2)
+        with pytest.raises(Overtaken):
+            await late
+        for expected in (1, 3):
+            with pytest.raises(Overtaken):
+                await room.submit(three, "server", expected)
+        assert await room.submit(one, "server", 2) == 2
+        assert await room.submit(three, "server", 2) == 3
 
 
 async def test_bytes_are_stored_as_they_came_and_only_if_they_bring_something(

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from action_assistant.commands.client import Server, add_server, decoded, running
 from action_assistant.commands.directories import why
 from action_assistant.commands.sync.folder import Folder, SyncedFile, sha
-from action_assistant.errors import CannotStart, RequestRefused
+from action_assistant.errors import CannotStart, Overtaken, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.system.posix import fcntl
 from action_assistant.umrf.digest import digest
@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # slow to load, and needed only once there is a server
 
 _JSON: Final = {"content-type": "application/json"}
 _CONFLICT: Final = 409
+_OVERTAKEN: Final = Overtaken("").type
 _TODAY: Final = "D3"
 _FIRST: Final = 1  # the change by which a graph is made
 _ID: Final = re.compile(r"[A-Za-z0-9_-]+")
@@ -178,8 +179,8 @@ class SyncRound:
             asked = {"params": {"seq": file.seq}, "content": text, "headers": _JSON}
             merged = decoded(self._server.editor("PUT", path, **asked), MergedGraph)
         except RequestRefused as error:
-            if error.status != _CONFLICT:
-                raise
+            if error.status != _CONFLICT or error.kind == _OVERTAKEN:
+                raise  # the next round sends it again
             seq, now = self._text(file.graph)
             number = self._folder.put_copy(name, now)
             held = replace(file, conflict=seq, copy=number)

@@ -15,10 +15,16 @@ from action_assistant.editor.catalogue.graph_pages import (
     ThumbnailOf,
     Wanted,
 )
+from action_assistant.editor.catalogue.server_edits import store
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange import importing
-from action_assistant.editor.interchange.edited_text import TextEdit, edited_text, merging
+from action_assistant.editor.interchange.edited_text import (
+    MergingOutcome,
+    TextEdit,
+    edited_text,
+    merging,
+)
 from action_assistant.editor.interchange.importing import ImportReport, Preview
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
@@ -376,8 +382,8 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.people.seen(person)
         then = await services.graph_reader.at(graph_id, seq)
         inside = await _inside_with(services, then, text)
-        async with services.rooms.enter(graph_stream(graph_id)) as room:
-            now, state = await room.read(lambda replica, at: (at, replica.state()))
+
+        async def compute(state: bytes, now: int) -> MergingOutcome:
             found = await services.workers.files(merging, then, state, text, inside)
             if found.conflicts:
                 raise Conflict(
@@ -385,7 +391,10 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
                     "this text changes.",
                     where={"seq": now, "keys": list(found.conflicts[:_TOLD])},
                 )
-            newest = await room.submit(found.update, person.id)
-        return MergedGraph(newest, now > seq, found.problems)
+            return found
+
+        async with services.rooms.enter(graph_stream(graph_id)) as room:
+            edit = await store(room, person.id, compute, lambda found: found.update)
+        return MergedGraph(edit.seq, edit.before > seq, edit.computed.problems)
 
     return [get_umrf, get_problems, get_breakpoints, get_rewriting, put_umrf]

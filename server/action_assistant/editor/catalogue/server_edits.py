@@ -1,9 +1,65 @@
 """Edits that the server makes itself: made on a copy, then submitted to the room as one update (rule R9)."""
 
+from collections.abc import Awaitable, Callable
+from typing import Final, Generic, NamedTuple, TypeVar
+
 from action_assistant.editor.interchange.document_edits import calling_actions, renaming, restoring
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.room import Room
+from action_assistant.errors import Overtaken
 from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+T = TypeVar("T")
+
+_TRIES: Final = 5
+
+
+class StoredEdit(NamedTuple, Generic[T]):
+    """An edit of the server that is stored. `computed`: what it was made from; `before`: the last
+    change that it takes into account; `seq`: its own number, or `before` if it changed nothing."""
+
+    computed: T
+    before: int
+    seq: int
+
+    @property
+    def changed(self) -> bool:
+        """Return whether the edit has changed the document."""
+        return self.seq > self.before
+
+
+async def store(
+    room: Room,
+    author: str,
+    compute: Callable[[bytes, int], Awaitable[T]],
+    update_of: Callable[[T], bytes],
+) -> StoredEdit[T]:
+    """Store an edit of the server that depends on what the document holds, in the name of `author`.
+    `compute` is given the document (encoded) and the number of its last change; `update_of` returns
+    the update of what it returns. If people change the document meanwhile, it is computed again: an
+    update made without their edits could remove or replace what they have set. Raise what `compute`
+    raises; Overtaken, when nothing is stored, if people were faster a few times; BadInput or
+    TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable if the room is
+    closed or the edit cannot be stored."""
+    for _ in range(_TRIES):
+        state, before = await room.read(lambda replica, seq: (replica.state(), seq))
+        computed = await compute(state, before)
+        try:
+            seq = await room.submit(update_of(computed), author, expected=before)
+        except Overtaken:
+            continue
+        return StoredEdit(computed, before, seq)
+    raise Overtaken(
+        f"Others have changed this {_TRIES} times while the edit was worked out. Nothing of it was "
+        "written; try again."
+    )
+
+
+async def store_update(
+    room: Room, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
+) -> StoredEdit[bytes]:
+    """Do what `store` does, with the update that `compute` returns."""
+    return await store(room, author, compute, lambda update: update)
 
 
 async def rename(
@@ -16,32 +72,29 @@ async def rename(
     run_in_worker: RunInWorker = run_here,
 ) -> int:
     """Give the graph or library action (`kind`) in a room another name or description, in the name
-    of `author`; None keeps the old one. Return the number (seq) of the last change in its log then.
-    Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable
-    if the room is closed or the edit cannot be stored."""
-    state = await room.read(lambda replica, _: replica.state())
-    update = await run_in_worker(renaming, state, name, description, kind)
-    return await room.submit(update, author)
+    of `author`; None keeps the old one. Return the number (seq) of this edit, or of the last change
+    if it changed nothing. Raise the errors of `store`."""
+    edit = await store_update(
+        room, author, lambda state, _: run_in_worker(renaming, state, name, description, kind)
+    )
+    return edit.seq
 
 
 async def call_actions(
     room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
 ) -> bool:
     """Rename all actions called `before` to `name`, as one edit in the name of `author`. Return
-    whether there was one. Raise BadInput or TooLarge if the edit is refused, Conflict if the log is
-    damaged, Unavailable if the room is closed or the edit cannot be stored."""
-    state, seq = await room.read(lambda replica, seq: (replica.state(), seq))
-    update = await run_in_worker(calling_actions, state, before, name)
-    return await room.submit(update, author) > seq
+    whether there was one. Raise the errors of `store`."""
+    edit = await store_update(
+        room, author, lambda state, _: run_in_worker(calling_actions, state, before, name)
+    )
+    return edit.changed
 
 
 async def restore(
     room: Room, author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
-) -> int:
+) -> StoredEdit[bytes]:
     """Restore a graph to the content of the document `then` (encoded) by an ordinary edit in the
-    name of `author`, which can be undone. Its comments stay as they are now. Return the number
-    (seq) of the last change in its log then. Raise BadInput or TooLarge if the edit is refused,
-    Conflict if the log is damaged, Unavailable if the room is closed or the edit cannot be stored.
-    """
-    state = await room.read(lambda replica, _: replica.state())
-    return await room.submit(await run_in_worker(restoring, state, then), author)
+    name of `author`, which can be undone. Its comments stay as they are now. Raise the errors of
+    `store`."""
+    return await store_update(room, author, lambda state, _: run_in_worker(restoring, state, then))

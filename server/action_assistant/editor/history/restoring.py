@@ -11,6 +11,7 @@ from sqlalchemy import Connection
 
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.server_edits import StoredEdit, store, store_update
 from action_assistant.editor.documents.values import ends_of
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
@@ -29,7 +30,6 @@ from action_assistant.editor.history.key_changes import (
 from action_assistant.editor.interchange.document_edits import setting
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import BadInput, Conflict, NotFound, TooLarge
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.model import ENTRY, EXIT
@@ -225,11 +225,10 @@ class Restoring:
         Unavailable if the journal cannot be read or written."""
         then = await self._graph_reader.at(graph, seq)
         async with self._rooms.enter(h.graph_stream(graph)) as room:
-            before = room.seq
-            now = await server_edits.restore(
+            edit = await server_edits.restore(
                 room, author, then.state, run_in_worker=self._run_in_worker
             )
-        return await self._said(graph, author, before, seq, now)
+        return await self._said(graph, author, seq, edit)
 
     async def restore_one(self, graph: str, author: str, seq: int, owner: str) -> GoneBack:
         """Restore one action, arrow or note (`owner`: its key) of a graph to its state after the
@@ -243,10 +242,12 @@ class Restoring:
                 where={"path": "/seq"},
             )
         async with self._rooms.enter(h.graph_stream(graph)) as room:
-            before, state = room.seq, await _state(room)
-            update = await self._index.value(one_as_it_was, graph, state, seq, owner)
-            now = await room.submit(update, author)
-        return await self._said(graph, author, before, seq, now)
+            edit = await store_update(
+                room,
+                author,
+                lambda state, _: self._index.value(one_as_it_was, graph, state, seq, owner),
+            )
+        return await self._said(graph, author, seq, edit)
 
     async def revert(self, graph: str, author: str, edits: EditsOfOne) -> GoneBack:
         """Revert the edits of one person in a graph, in the name of `author`; return its last
@@ -259,26 +260,25 @@ class Restoring:
                 "What a graph began with cannot be taken back, and nothing ends before it begins.",
                 where={"path": "/from_seq"},
             )
-        async with self._rooms.enter(h.graph_stream(graph)) as room:
-            before, state = room.seq, await _state(room)
+
+        async def compute(state: bytes, _: int) -> RevertedEdits:
             upto = await self._index.upto(graph)  # with whatever that state holds
             found = await self._index.value(
                 reverting_edits, graph, state, edits.author, first, min(last, upto), _MOST
             )
             if found is None:
                 raise NotFound("This person changed nothing then.")
-            now = await room.submit(found.update, author)
-        if now > before:
-            body = h.GraphReverted(edits.author, first, last, now)
+            return found
+
+        async with self._rooms.enter(h.graph_stream(graph)) as room:
+            edit = await store(room, author, compute, lambda found: found.update)
+        if edit.changed:
+            body = h.GraphReverted(edits.author, first, last, edit.seq)
             await self._journal.append(h.about_stream(graph), [h.draft(h.REVERTED, author, body)])
-        return GoneBack(now, found.left)
+        return GoneBack(edit.seq, edit.computed.left)
 
-    async def _said(self, graph: str, author: str, before: int, then: int, now: int) -> GoneBack:
-        if now > before:
-            restored = h.draft(h.RESTORED, author, h.GraphRestored(then, now))
+    async def _said(self, graph: str, author: str, then: int, edit: StoredEdit[bytes]) -> GoneBack:
+        if edit.changed:
+            restored = h.draft(h.RESTORED, author, h.GraphRestored(then, edit.seq))
             await self._journal.append(h.about_stream(graph), [restored])
-        return GoneBack(now)
-
-
-async def _state(room: Room) -> bytes:
-    return await room.read(lambda replica, _: replica.state())
+        return GoneBack(edit.seq)

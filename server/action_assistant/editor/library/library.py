@@ -6,6 +6,7 @@ Actions are made, imported, updated from graphs, and graphs updated from them.
 import logging
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
+from functools import partial
 from typing import Any, Final
 
 import anyio
@@ -16,6 +17,7 @@ from sqlalchemy import select
 from action_assistant.editor.catalogue.catalogue import Catalogue, GraphView, fit
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.graph_rights import Sees, sight_of_everything
+from action_assistant.editor.catalogue.server_edits import store_update
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.library import library_updates
@@ -277,10 +279,25 @@ class LibraryEdits:
             for each, room, _ in updates:
                 if room.seq != each.seq:
                     raise _changed(each, room.seq)
-            return [
-                await self._adapt(room, each.graph, update, author, sight, name)
-                for each, room, update in updates
-            ]
+
+            updated: list[UpdatedGraph] = []
+
+            async def updating(known: bytes, each: GraphMoment, state: bytes, seq: int) -> bytes:
+                if seq == each.seq:
+                    return known
+                if not updated:
+                    raise _changed(each, seq)
+                # Others are written already, so this one is updated as it is by now.
+                now = GraphAtSeq(each.graph, seq, state)
+                update: bytes = await self._graph_reader.ask(
+                    library_updates.updating, sight, now, renames
+                )
+                return update
+
+            for each, room, update in updates:
+                compute = partial(updating, update, each)
+                updated.append(await self._adapt(room, each.graph, compute, author, sight, name))
+            return updated
 
     async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
         """Give an action of the library the parameters that one of its uses in a graph has; return
@@ -290,10 +307,14 @@ class LibraryEdits:
         await self._catalogue.require(graph, "graph")
         source = await self._graph_reader.now(graph)
         name = (await self._catalogue.get(action)).name
+
+        async def taking(state: bytes, seq: int) -> bytes:
+            sight = GraphAtSeq(action, seq, state)
+            update: bytes = await self._graph_reader.ask(library_updates.taking, sight, source, aid)
+            return update
+
         async with self._rooms.enter(h.graph_stream(action)) as room:
-            sight = await _now(room, action)
-            update = await self._graph_reader.ask(library_updates.taking, sight, source, aid)
-            await self._adapt(room, action, update, author, source, name)
+            await self._adapt(room, action, taking, author, source, name)
         return await self._catalogue.get(action)
 
     async def replacing_would(self, action: str, body: bytes) -> bytes:
@@ -312,14 +333,16 @@ class LibraryEdits:
         action, or if `seq` is not the last change."""
         await self._catalogue.require(action, "action")
         name = (await self._catalogue.get(action)).name
+
+        async def replacing(state: bytes, now: int) -> bytes:
+            if seq is not None and now != seq:
+                raise _changed(GraphMoment(action, seq), now, "action")
+            return await self._files(
+                library_updates.replacing, GraphAtSeq(action, now, state), body
+            )
+
         async with self._rooms.enter(h.graph_stream(action)) as room:
-            sight = await _now(room, action)
-            if seq is not None and sight.seq != seq:
-                raise _changed(GraphMoment(action, seq), sight.seq, "action")
-            update = await self._files(library_updates.replacing, sight, body)
-            if seq is not None and room.seq != seq:
-                raise _changed(GraphMoment(action, seq), room.seq, "action")
-            await self._adapt(room, action, update, author, GraphAtSeq("", 0, b""), name)
+            await self._adapt(room, action, replacing, author, GraphAtSeq("", 0, b""), name)
         return await self._catalogue.get(action)
 
     async def built(self, action: str, build: h.ActionBuilt, author: str) -> None:
@@ -347,19 +370,18 @@ class LibraryEdits:
         self,
         room: Room,
         document: str,
-        update: bytes,
+        compute: Callable[[bytes, int], Awaitable[bytes]],
         author: str,
         source: GraphAtSeq,
         name: str,
     ) -> UpdatedGraph:
-        before = room.seq
-        seq = await room.submit(update, author)
-        if seq > before:
-            adapted = h.GraphAdapted(seq, source.graph, source.seq, name)
+        edit = await store_update(room, author, compute)
+        if edit.changed:
+            adapted = h.GraphAdapted(edit.seq, source.graph, source.seq, name)
             await self._journal.append(
                 h.about_stream(document), [h.draft(h.ADAPTED, author, adapted)]
             )
-        return UpdatedGraph(document, seq, seq > before)
+        return UpdatedGraph(document, edit.seq, edit.changed)
 
     async def _using(self, name: str) -> list[GraphAtSeq]:
         """Return the graphs that use the action of this name and that the person sees, in their
@@ -370,14 +392,10 @@ class LibraryEdits:
         return [await self._graph_reader.now(view.id) for view in views]
 
 
-async def _now(room: Room, document: str) -> GraphAtSeq:
-    return await room.read(lambda replica, seq: GraphAtSeq(document, seq, replica.state()))
-
-
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
     """Return the graph in this room if its last change is still the one that a person has seen
     (`moment`); raise Conflict if not."""
-    found = await _now(room, moment.graph)
+    found = await room.read(lambda replica, seq: GraphAtSeq(moment.graph, seq, replica.state()))
     if found.seq != moment.seq:
         raise _changed(moment, found.seq)
     return found

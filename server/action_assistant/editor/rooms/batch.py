@@ -115,7 +115,8 @@ class BatchWindow:
 class SubmittedEdit(msgspec.Struct, frozen=True):
     """An edit that waits in the queue of a room, from a socket (`member`) or from the server itself (`done`
     gets the sequence number after the commit). `at`: when it was received, in seconds of `perf_counter`.
-    `origin`: the connection of the author, if it is known."""
+    `origin`: the connection of the author, if it is known. `expected`: the change that has to be the last one
+    when the edit is applied; None: any."""
 
     update: bytes
     author: str
@@ -123,6 +124,7 @@ class SubmittedEdit(msgspec.Struct, frozen=True):
     done: "asyncio.Future[int] | None" = None
     at: float = msgspec.field(default_factory=time.perf_counter)
     origin: Origin | None = None
+    expected: int | None = None
 
 
 class SyncRequest(msgspec.Struct, frozen=True):
@@ -169,6 +171,14 @@ class BatchOutcome:
         self.reads: list[ReadRequest] = []
         #: True after a panic of the CRDT library: the document has to be loaded anew.
         self.panicked = False
+
+    def seq_for(self, edit: SubmittedEdit, seq: int) -> int:
+        """Return the number that the server code that waits for `edit` gets. `seq`: that of the last
+        committed change. An edit with an `expected` change was the first to be stored after it, if
+        it was stored."""
+        if edit.expected is None:
+            return seq
+        return edit.expected + any(stored is edit for stored, _ in self.to_store[:1])
 
 
 class NotAllowed(Exception):

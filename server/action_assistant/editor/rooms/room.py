@@ -53,7 +53,7 @@ from action_assistant.editor.rooms.housekeeping import (
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
 from action_assistant.editor.rooms.sittings import EditSittings
-from action_assistant.errors import Conflict, Refused, Unavailable
+from action_assistant.errors import Conflict, Overtaken, Refused, Unavailable
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.logs import about
@@ -70,6 +70,7 @@ _ACK_BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 
 _ANNOUNCEMENT_WAIT: Final = 1.5
 _DAMAGED: Final = "This graph can only be read: change {} of its history is damaged."
 _CLOSING: Final = "This graph is being closed; try again."
+_OVERTAKEN: Final = "Others have changed this graph meanwhile; try again."
 _ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
 
@@ -137,7 +138,7 @@ class UpdateBroadcast:
                 authors[edit.member] = None
                 edit.member.edit_handled()
             if edit.done is not None and not edit.done.done():
-                edit.done.set_result(seq)
+                edit.done.set_result(outcome.seq_for(edit, seq))
         frames = [messages.change(update) for update in merged(outcome.to_send)]
         announces = bool(outcome.to_store) and self._announces_now()
         own = {edit.member for edit, _ in outcome.to_store}
@@ -336,18 +337,21 @@ class Room:
 
     # --- requests of the server itself ----------------------------------------------------------
 
-    async def submit(self, update: bytes, author: str) -> int:
+    async def submit(self, update: bytes, author: str, expected: int | None = None) -> int:
         """Apply and store an edit (`update`) of the server itself in the name of `author` (rule
         R9), and wait for the commit. Return the number (seq) of the last committed change then,
         also if the edit changed nothing. Raise BadInput or TooLarge if the edit is refused,
         Conflict if the log is damaged, Unavailable if the room is closed or the edit cannot be
-        stored."""
+        stored. `expected`: the change after which the edit was computed. Raise Overtaken if
+        it is not the last one when the turn of the edit comes; else return the number of the edit
+        itself, or `expected` if it changed nothing."""
         if self.damaged is not None:
             raise Conflict(_DAMAGED.format(self.damaged.seq))
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[int] = self._loop.create_future()
-        self._enqueue(SubmittedEdit(update, author, None, done, origin=origin_of(author)))
+        origin = origin_of(author)
+        self._enqueue(SubmittedEdit(update, author, None, done, origin=origin, expected=expected))
         return await done
 
     async def read(self, see: Callable[[Replica, int], T]) -> T:
@@ -509,7 +513,9 @@ class Room:
         outcome = BatchOutcome()
         member = edit.member
         try:
-            if member is not None and not member.edits and len(edit.update) > LARGE:
+            if self._is_overtaken(edit, outcome):
+                fail(edit, Overtaken(_OVERTAKEN))
+            elif member is not None and not member.edits and len(edit.update) > LARGE:
                 await self._check_large_edit_of_viewer(edit, member, outcome)
             else:
                 read = None
@@ -540,6 +546,9 @@ class Room:
     ) -> None:
         """Apply one edit and add it to `outcome`, or refuse it. `read`: its outline, if the caller
         has it."""
+        if self._is_overtaken(edit, outcome):
+            fail(edit, Overtaken(_OVERTAKEN))
+            return
         begun = time.thread_time()
         try:
             effect = self._effect_of(edit, read)
@@ -552,6 +561,12 @@ class Room:
                 edit.member.used_cpu(time.thread_time() - begun)
         if effect is not None:
             self._note_effect(edit, outcome, effect)
+
+    def _is_overtaken(self, edit: SubmittedEdit, outcome: BatchOutcome) -> bool:
+        """Return whether an edit expects another last change than this one. `outcome`: of the edits
+        before it in its batch."""
+        expected = edit.expected
+        return expected is not None and (expected != self.seq or bool(outcome.to_store))
 
     async def _apply_in_pieces(
         self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline

@@ -3,6 +3,7 @@
 import msgspec
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
+from action_assistant.editor.catalogue.server_edits import store
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.change_summaries import Changes
 from action_assistant.editor.history.drafts.drafts import DraftPair, Drafts
@@ -11,6 +12,7 @@ from action_assistant.editor.history.drafts.merge_previews import (
     DraftMerge,
     DraftSide,
     DraftSides,
+    MadeMerge,
     UnmadeChoices,
     made_merge,
     other_side,
@@ -117,31 +119,30 @@ class DraftMerges:
         journal cannot be written."""
         row = (await self._drafts.pair(draft)).row
         target: str = row.draft_of if wanted.into == "origin" else draft
-        async with self._rooms.enter(h.graph_stream(target)) as room:
+        seen = wanted.seq if wanted.into == "origin" else wanted.draft_seq
+
+        async def compute(_: bytes, seq: int) -> tuple[DraftPair, DraftMerge, MadeMerge]:
             pair = await self._drafts.pair(draft)
             _require_moments(pair.sides, wanted)
+            if seq != seen:
+                raise _moved_on(wanted.into)
             merge = await self._merge(pair.sides, wanted)
             found = await self._index.value(made_merge, merge)
             _require_choices(found.left)
-            seen = wanted.seq if wanted.into == "origin" else wanted.draft_seq
-            if room.seq != seen:
-                raise _moved_on(wanted.into)
-            now = await room.submit(found.update, author)
-        seq = await self._entered(target, seen, now, found.update)
-        if seq or found.any_conflicts:
+            return pair, merge, found
+
+        async with self._rooms.enter(h.graph_stream(target)) as room:
+            edit = await store(room, author, compute, lambda computed: computed[2].update)
+        pair, merge, found = edit.computed
+        if edit.changed or found.any_conflicts:
             source = merge.source
             since = await self._since(pair, source.graph, target)
+            seq = edit.seq if edit.changed else 0
             body = h.GraphMerged(
                 draft, pair.row.draft_name, source.graph, since, source.seq, seq, found.authors
             )
             await self._journal.append(h.about_stream(target), [h.draft(h.MERGED, author, body)])
-        return MergedDraft(target, now, seq > 0)
-
-    async def _entered(self, graph: str, before: int, now: int, update: bytes) -> int:
-        """Return the number of the change as which the log has this update, after the change
-        `before` and up to `now`; 0 if it has none, since it changed nothing."""
-        events = await self._journal.read(h.graph_stream(graph), after=before, upto=now)
-        return next((event.seq for event in events if event.body == update), 0)
+        return MergedDraft(target, edit.seq, edit.changed)
 
     async def _merge(self, sides: DraftSides, asked: AskedMerge | WantedMerge) -> DraftMerge:
         """Return the merge to compute for a request, once the index has the side that is brought
