@@ -108,7 +108,7 @@ def start_of(request: str, engine: str) -> dict[str, Any]:
         "umrf": GRAPH,
         "engine": engine,
         "request_id": request,
-        "script": {"behaviours": {"*": [{"after_s": 60, "stop_s": 0}]}},
+        "script": {"behaviours": {"*": [{"never": True, "stop_s": 0}]}},
     }
 
 
@@ -520,12 +520,8 @@ class Week:
         """Make a Stop drill: start, Stop, and the word of who saw it."""
         if guest.role != "operator":
             return
-        self.number += 1
-        start = start_of(f"r{self.number}", DRILLED)
-        start.pop("script")
-        begun = guest.runner("POST", "/api/runs", json=start)
-        assert begun.status_code == 201, begun.text
-        run = begun.json()["id"]
+        begun = until("a drill begins", lambda: self._drill_begun(guest))
+        run = begun["id"]
         self.fact(guest.id, "run.requested.v1", run)
         path = f"/api/runs/{run}"
 
@@ -542,6 +538,20 @@ class Week:
         done = guest.runner("POST", f"/api/robots/{DRILLED}/drills", json=saw)
         assert done.is_success, done.text
         self.fact(guest.id, "robot.drilled.v1")
+
+    def _drill_begun(self, guest: Guest) -> dict[str, Any] | None:
+        """Start a run for a drill; None if the robot was too slow to answer, which refuses the start
+        and no other one."""
+        self.number += 1
+        start = start_of(f"r{self.number}", DRILLED)
+        start.pop("script")
+        begun = guest.runner("POST", "/api/runs", json=start)
+        if begun.status_code == 201:
+            return dict(begun.json())
+        where = {"path": "/engine", "item": "answers"}
+        assert (begun.status_code, begun.json()["where"]) == (503, where), begun.text
+        self.fact(guest.id, "audit.start_refused.v1")
+        return None
 
     def _look(self, guest: Guest) -> None:
         """Only look: that is no fact of the audit."""
