@@ -1,6 +1,8 @@
 """The audit stores each fact that it was given, and few rows of a flood."""
 
 import asyncio
+import contextlib
+import sqlite3
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -75,6 +77,33 @@ async def test_a_journal_that_fails_gets_everything_later(monkeypatch: pytest.Mo
         store.fails = False
     sessions = [msgspec.json.decode(each.body)["session"] for each in store.drafts]
     assert sessions == [f"t{number}" for number in range(300)]
+
+
+@pytest.mark.parametrize("is_locked", [False, True])
+async def test_at_the_end_only_what_the_journal_was_not_given_is_called_lacking(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    is_locked: bool,
+) -> None:
+    monkeypatch.setattr("action_assistant.web.audit.log._AT_THE_END_S", 0.2)
+    monkeypatch.setattr("action_assistant.web.audit.log._BATCH", 20)
+    url = f"sqlite:///{tmp_path / 'runner.db'}"
+    journal = await Journal.open(url, branch="runner", fold=nothing)
+    audit = AuditLog()
+    with contextlib.closing(sqlite3.connect(tmp_path / "runner.db", isolation_level=None)) as other:
+        async with audit.writing(journal):
+            if is_locked:
+                other.execute("BEGIN IMMEDIATE")
+            for number in range(25):
+                audit.note(SessionEnded(f"t{number}"), "ada")
+        if is_locked:
+            other.execute("ROLLBACK")
+        await journal.close()
+        stored = other.execute("SELECT count(*) FROM event").fetchone()
+    lacking = [each for each in caplog.messages if "lacks" in each]
+    assert stored == ((20,) if is_locked else (25,))
+    assert lacking == (["the audit lacks its last 5 events"] if is_locked else [])
 
 
 async def test_an_event_that_cannot_be_stored_holds_up_no_other_one_and_is_counted() -> None:

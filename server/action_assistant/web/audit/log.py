@@ -66,7 +66,7 @@ _DAY_US: Final = 24 * 60 * _MINUTE_US
 _TICK_S: Final = 5.0  # between two looks whether a minute is over
 _UNLISTED_TICKS: Final = 720  # an hour: so often the number of what has no row is stored
 _AGAIN_S: Final = 2.0  # between attempts of a journal that fails
-_AT_THE_END_S: Final = 1.0
+_AT_THE_END_S: Final = 5.0  # as long as a lock of the database lasts that is not a fault
 
 
 class AuditStore(Protocol):
@@ -195,6 +195,7 @@ class AuditLog:
     def __init__(self, clock_us: ClockUs = utc_us) -> None:
         self._clock_us = clock_us
         self._waiting: deque[Draft] = deque()
+        self._handed_over = 0  # of the first that wait: the journal has them, and has not answered
         self._lost = 0
         self._strangers = RefusalCounts(clock_us)
         self._repeats = RepeatCounts(clock_us)
@@ -249,7 +250,7 @@ class AuditLog:
     @asynccontextmanager
     async def writing(self, journal: "AuditStore") -> AsyncIterator[None]:
         """Return a context during which facts are stored as they are noted; at its end the
-        remainder is stored, for a second at most."""
+        remainder is stored, for five seconds at most."""
         if isinstance(journal, JournalReader):
             await self._recall(journal)
         self._closing = False
@@ -264,8 +265,11 @@ class AuditLog:
             await asyncio.wait(tasks[:1], timeout=_AT_THE_END_S)
             tasks[0].cancel()
             await asyncio.wait(tasks)
-            if self._waiting:
-                log.error("the audit lacks its last %d events", len(self._waiting))
+            if lacking := len(self._waiting) - self._handed_over:
+                log.error("the audit lacks its last %d events", lacking)
+            if self._handed_over:  # a journal that is closed stores what it has
+                text = "%d events of the audit are being stored; nobody waits for that any longer"
+                log.warning(text, self._handed_over)
 
     def _add(self, draft: Draft) -> None:
         if len(self._waiting) >= _WAITING:
@@ -281,19 +285,22 @@ class AuditLog:
             self._news.clear()
             while self._waiting:
                 batch = [self._waiting[n] for n in range(min(len(self._waiting), most))]
+                self._handed_over = len(batch)
                 try:
                     await journal.append(stream_at(self._clock_us()), batch)
                 except Unavailable as refused:
+                    self._handed_over = 0
                     log.warning("the audit is not stored yet: %s", refused.detail)
                     await asyncio.sleep(_AGAIN_S)
                     continue
                 except Exception:  # of one event, which must not hold up those after it
                     log.exception("%d events of the audit cannot be stored", len(batch))
                     if most > 1:
-                        most = 1
+                        self._handed_over, most = 0, 1
                         continue
                     self._lost += 1
                 most = min(_BATCH, 2 * most)
+                self._handed_over = 0
                 for _ in batch:
                     self._waiting.popleft()
                 if self._lost:
