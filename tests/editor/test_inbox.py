@@ -19,7 +19,7 @@ from action_assistant.editor.inbox import Inbox, Inboxes
 from action_assistant.editor.log import graph_events as h
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.schema.editor_tables import mention_due, outbox
+from action_assistant.schema.editor_tables import mention, mention_due, outbox
 from support.doses import examples
 from web.notifications.receiving import webhook
 
@@ -64,8 +64,8 @@ def _marked(graph: str, seq: int) -> Insert:
     return insert(mention_due).prefix_with("OR IGNORE").values(values)
 
 
-async def _opened(folder: Path) -> Journal:
-    url = f"sqlite:///{folder / 'editor.db'}"
+async def _opened(folder: Path, url: str = "") -> Journal:
+    url = url or f"sqlite:///{folder / 'editor.db'}"
     journal = await Journal.open(url, branch="editor", fold=h.fold)
     for graph in ("g1", "g2"):
         made = h.draft(h.CREATED, "ann", h.GraphCreated(f"Fetch {graph}", ""))
@@ -118,6 +118,32 @@ async def test_a_mention_is_found_with_the_author_that_the_log_knows(
         )
     ]
     assert await journal.query(select(mention_due)) == []
+
+
+@pytest.mark.parametrize("database", ["sqlite", "postgres"])
+async def test_mentions_out_of_sight_or_taken_back_leave_room_for_all_others(
+    request: pytest.FixtureRequest, tmp_path: Path, database: str
+) -> None:
+    server = request.getfixturevalue("postgres") if database == "postgres" else None
+    journal = await _opened(tmp_path, "" if server is None else server.new_database())
+    index = ChangeIndex(journal)
+    inboxes = Inboxes(journal, index, [CHAT])
+    page = Page(journal, "g1", "ann")
+    await page.say("t/1", "@Ben", "ben")
+    for number in range(3):
+        await page.say(f"t/more {number}", "@Ben", "ben")
+    assert (await _of(inboxes, "ben")).unread == 4
+    for number in range(3):
+        await page.put(f"t/more {number}", None)
+    await index.upto("g1")  # so that it is known that they are gone
+    fields = {"person": "ben", "graph": "g2", "seq": 1, "author": "eve", "text": "@Ben"}
+    late = [{"key": f"e/{n}", "at": 2**53 + n, **fields} for n in range(1_100)]
+    await journal.derive(lambda connection: connection.execute(insert(mention), late))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(inbox, "_SHOWN", 2)  # fewer than were taken back
+        found = await inboxes.of("ben", {"g1"}.__contains__)
+    assert ([each.key for each in found.mentions], found.unread) == (["t/1"], 1)
+    await journal.close()
 
 
 async def test_a_new_name_changes_nothing(journal: Journal, inboxes: Inboxes) -> None:

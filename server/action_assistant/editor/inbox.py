@@ -10,6 +10,7 @@ from collections.abc import Set as AbstractSet
 from contextlib import asynccontextmanager
 from datetime import datetime
 from functools import partial
+from itertools import islice
 from typing import Any, Final, TypeAlias
 
 import anyio
@@ -316,6 +317,8 @@ def _fresh(connection: Connection, found: FoundMentions) -> tuple[str, ...]:
 
 def _inbox_of(connection: Connection, reader: str, sees: Callable[[str], bool]) -> Inbox:
     c = mention.c
+    graphs = connection.scalars(select(c.graph).where(c.person == reader).distinct())
+    hidden = [each for each in graphs if not sees(each)]  # not in the way of what is seen
     chosen = (
         select(
             c.key, c.graph, graph.c.name, c.author, c.at, c.text, mention_read.c.key.label("read")
@@ -324,13 +327,21 @@ def _inbox_of(connection: Connection, reader: str, sees: Callable[[str], bool]) 
         .outerjoin(
             mention_read, and_(mention_read.c.person == c.person, mention_read.c.key == c.key)
         )
-        .where(c.person == reader)
+        .where(c.person == reader, c.graph.not_in(hidden))
         .order_by(c.at.desc(), c.key)
         .limit(10 * _SHOWN)
     )
     known = stored_people(connection)
-    seen = [each for each in connection.execute(chosen).all() if sees(each.graph)][:_SHOWN]
-    rows = [each for each in seen if _stands(connection, each.graph, each.key, reader)]
+    rows = list(
+        islice(
+            (
+                each
+                for each in connection.execute(chosen).all()
+                if _stands(connection, each.graph, each.key, reader)
+            ),
+            _SHOWN,
+        )
+    )
     found = [
         Mention(
             key=each.key,
