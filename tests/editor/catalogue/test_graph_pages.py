@@ -13,7 +13,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from action_assistant.editor.catalogue import graph_facts, graph_pages
+from action_assistant.editor.catalogue import graph_facts, graph_pages, server_edits
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.folders import Folders
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
@@ -27,6 +27,7 @@ from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import NotFound
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.web.auth.caller import Caller, set_caller
 from action_assistant.web.auth.graph_rules import Rule
 from action_assistant.web.auth.graph_seals import RulesFile
 from action_assistant.web.auth.identity import Identity
@@ -107,6 +108,40 @@ async def found(
     page = await services.pages.page(identity, Wanted(**wanted), limit=limit)
     assert page.total == len(page.graphs) or limit < page.total
     return [view.name for view in page.graphs]
+
+
+async def test_a_person_who_sees_less_changes_no_order_for_those_who_see_everything(
+    services: Opened,
+) -> None:
+    def of(action: str, *, exits: bool) -> dict[str, Any]:
+        end = [{"name": action, "instance_id": 0}]
+        actions = [{**end[0], "type": "sync"}]
+        return {"actions": actions, "graph_entry": end, "graph_exit": end if exits else []}
+
+    async def bens() -> list[int | None]:
+        set_caller(Caller("ben", identity=BEN))
+        page = await services.pages.page(BEN, Wanted(), limit=9)
+        return [view.problems and view.problems.error for view in page.graphs]
+
+    inner = await bring(services, "Inner", **of("Step", exits=False))
+    outer = await bring(services, "Outer", **of("Inner", exits=True))
+    sound = await bring(services, "Sound", **of("Other", exits=True))
+    await services.rights.rule_for_graph(inner, MINE, "ann")
+    for description in ("", "later"):
+        if description:
+            for graph in (outer, sound):
+                async with services.rooms.enter(h.graph_stream(graph)) as room:
+                    await server_edits.rename(room, "ben", name=None, description=description)
+        assert await asyncio.create_task(bens()) == [0, 0]
+        page = await services.pages.page(ANN, Wanted(), limit=2, order="problems")
+        assert {view.name for view in page.graphs} == {"Inner", "Outer"}
+        last = services.checks.last_summary(outer, page.graphs[0].seq)
+        assert last.problems is not None
+        assert last.problems.error == 1
+        assert await asyncio.create_task(bens()) == [0, 0]
+        last = services.checks.last_summary(outer, page.graphs[0].seq)
+        assert last.problems is not None
+        assert last.problems.error == 1
 
 
 @pytest.mark.parametrize("order", ORDERS)

@@ -69,13 +69,15 @@ class _Member(msgspec.Struct, frozen=True):
 class NamedInside(msgspec.Struct, frozen=True):
     """The graphs inside of a graph, by name, on which a check depends, too. `several`: names that
     several graphs have; `cut`: more graphs are inside than listed; `hidden`: names that an
-    action of the library has, too; `unseen`: graphs are left out that the person may not see."""
+    action of the library has, too; `unseen`: graphs are left out that the person may not see;
+    `partial`: for somebody who sees every graph there is more to say."""
 
     members: tuple[_Member, ...] = ()
     several: tuple[str, ...] = ()
     cut: bool = False
     hidden: tuple[str, ...] = ()
     unseen: bool = False
+    partial: bool = False
 
     def __bool__(self) -> bool:
         """Return whether a result depends on any graph inside."""
@@ -117,6 +119,8 @@ class GraphChecks:
         self.names: Final = GraphNames(journal, self._name, self._known_names)
         self._hopeless = LruCache[str, tuple[int, Refused]](_COUNTED)
         self._problems = LruCache[tuple[str, int, bytes], bytes](_REMEMBERED)
+        #: What persons are told who do not see all that is inside.
+        self._partial = LruCache[tuple[str, int, bytes], CountsInside](_COUNTED)
         self._digests = LruCache[tuple[str, int], str](_COUNTED)
         self._uses = LruCache[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
 
@@ -281,16 +285,19 @@ class GraphChecks:
 
     async def _counted(self, graph: str, about: Facts, named: NamedInside) -> CountsInside:
         key = named.key()
-        if about.inside is None or about.inside.key != key:
-            sight = await self._sight(graph, about.seq)
-            inside = await self._seen(named, partly=True)
-            found = await self._reader.ask(contents.counted, sight, inside)
-            counted = CountsInside(key, *found)
-            now = self.facts.get(graph)
-            if now is not None and now.seq == about.seq:  # else an edit came in between
-                self.facts.put(graph, msgspec.structs.replace(about, inside=counted))
-            return counted
-        return about.inside
+        place = graph, about.seq, key
+        known = self._partial.get(place) if named.partial else about.inside
+        if known is not None and known.key == key:
+            return known
+        sight = await self._sight(graph, about.seq)
+        inside = await self._seen(named, partly=True)
+        counted = CountsInside(key, *await self._reader.ask(contents.counted, sight, inside))
+        if named.partial:  # lists are sorted by what is true for those who see everything
+            return self._partial.put(place, counted)
+        now = self.facts.get(graph)
+        if now is not None and now.seq == about.seq:  # else an edit came in between
+            self.facts.put(graph, msgspec.structs.replace(about, inside=counted))
+        return counted
 
     async def _about(self, graph: str, newest: int, *, of_any_version: bool = False) -> Facts:
         """Return the facts about a graph, without those inside, from the cache or a worker.
@@ -349,6 +356,7 @@ class GraphChecks:
         found: dict[str, _Member] = {}
         hidden: set[str] = set()
         level, actions, cut, unseen = [(own, uses)], 0, False, False
+        partial = False
         while level:
             below: list[tuple[str, Iterable[str]]] = []
             for graph, names in level:
@@ -371,14 +379,15 @@ class GraphChecks:
                     below.append((name, info.uses))
             level = below
         members = tuple(found[name] for name in sorted(found))
-        several = tuple([each.name for each in members if await self._is_ambiguous(each.name)])
-        return NamedInside(members, several, cut, tuple(sorted(hidden)), unseen)
-
-    async def _is_ambiguous(self, name: str) -> bool:
-        """Return whether several graphs that the person may see have this name: of the others
-        nothing tells."""
-        graphs = self.names.called(name)
-        return len(graphs) > 1 and sum([await self.caller_sees(graph) for graph in graphs]) > 1
+        several: list[str] = []
+        for each in members:
+            graphs = self.names.called(each.name)
+            seen = [await self.caller_sees(graph) for graph in graphs] if len(graphs) > 1 else []
+            if sum(seen) > 1:  # of those out of sight nothing tells
+                several.append(each.name)
+            partial = partial or not all(seen)
+        listed = members, tuple(several), cut, tuple(sorted(hidden)), unseen
+        return NamedInside(*listed, partial or unseen)
 
     async def _standing_for(self, name: str) -> tuple[_Member, GraphInfo] | None:
         known = self.names.graph(name)

@@ -29,6 +29,7 @@ from action_assistant.schema.editor_tables import (
     graph_label,
 )
 from action_assistant.schema.editor_tables import graph_facts as facts
+from action_assistant.web.auth.caller import acting_for
 from action_assistant.web.auth.identity import Identity
 
 #: By what a list is sorted; "changed" and "problems" and "size": the last, most or largest first.
@@ -37,6 +38,8 @@ Order: TypeAlias = Literal["changed", "name", "problems", "size"]
 MOST: Final = 200  # graphs on a page
 MOST_FIRST: Final = 200  # graphs that may be named to come first
 MOST_DRAWN: Final = 60  # thumbnails of one answer
+#: For whom facts are computed: the server sees every graph.
+_OURSELVES: Final = "facts of graphs"
 _READ: Final = 60  # documents that a query waits for
 _WORDS: Final = 20  # of a search
 _AT_ONCE: Final = 400  # graphs that one query names
@@ -234,8 +237,11 @@ class GraphPages:
             await self._checks.facts.note_changes(changed)
             if len(changed) <= _READ and await self._has_names(changed):
                 await self._checks.facts.recall([each.id for each in changed])
-                for each in changed:
-                    await self._checks.summary(each.id, each.seq)
+                with acting_for(
+                    _OURSELVES
+                ):  # counts that are stored are those of who sees everything
+                    for each in changed:
+                        await self._checks.summary(each.id, each.seq)
                 await self._checks.facts.write()
             else:
                 self._checks.compute_later({each.id: each.seq for each in changed})
