@@ -244,13 +244,38 @@ test("a step goes into a sub-graph that is opened, and over it", async () => {
   await holdEnter(page, waits(page).getByRole("button", { name: /^Let run \d+ go on$/ }));
   await expect(waits(page)).toContainText("Breakpoint before Close", { timeout: 15_000 });
   await expect(step("Grip 0 › Close 0")).toBeVisible();
+  await expect(card(page, "Grip")).toContainText("1 of 2 inside ended");
   await page.screenshot({ path: "test-results/over-1440.png" });
   await holdEnter(page, waits(page).getByRole("button", { name: /^Let all inside of .?Grip 0/ }));
   await expect(waits(page)).toContainText("It went over Grip_0: Lift_0 waits to begin", {
     timeout: 15_000,
   });
+  await expect(card(page, "Grip")).toContainText("2 of 2 inside ended");
   await page.getByRole("button", { name: /^Stop/ }).first().click();
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
+
+  const [stopped] = await runs();
+  await page.goto(`${product.url}/runs/${stopped?.id}`);
+  const again = async (name: string) => {
+    await page.getByRole("button", { name: "Run again" }).click();
+    await page.getByRole("menuitem", { name, exact: true }).click();
+  };
+  await again("Continue where it ended …");
+  await expect(dialog(page)).toContainText(words, { timeout: 15_000 });
+  await holdEnter(page, start);
+  const soon = { timeout: 20_000 };
+  await expect.poll(async () => (await runs())[0]?.state, soon).toBe("finished");
+  const [continued] = await runs();
+  expect(continued?.id).not.toBe(stopped?.id);
+  await page.goto(`${product.url}/runs/${stopped?.id}`);
+  await again("As it went");
+  await expect.poll(async () => (await runs())[0]?.id, soon).not.toBe(continued?.id);
+  await expect.poll(async () => (await runs())[0]?.state, soon).toBe("finished");
+  const [repeated] = await runs();
+  const { actions } = await product.ask<{ actions: object }>(
+    ...([`/api/runs/${repeated?.id}`, {}, product.runnerUrl] as const),
+  );
+  expect(Object.keys(actions).sort()).toEqual(["Close_0", "Drive_0", "Lift_0", "Reach_0"]);
 });
 
 test("a dry-run begins at an action, or plays nothing else", async () => {

@@ -2,8 +2,9 @@
 import { useQuery } from "@tanstack/react-query";
 import { runnerAt } from "./client";
 import { fetchAnswer } from "./http";
+import { sendPress } from "./presses";
 import type { Run } from "./run-stop";
-import { sendPress, type Watching } from "./runs";
+import type { Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
 export type Question = RunnerApi["QuestionShown"];

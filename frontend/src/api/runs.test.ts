@@ -1,5 +1,6 @@
 import { expect, test, vi } from "vitest";
-import { abilitiesOf, currentAlarm, giveOutcome, letGoOn, type Run } from "./runs";
+import { giveOutcome, letGoOn } from "./presses";
+import { abilitiesOf, currentAlarm, type Run } from "./runs";
 
 const alarm = (code: string, second: number) => ({
   code,

@@ -2,12 +2,9 @@
 
 import { useQuery } from "@tanstack/react-query";
 import type { RunBreakpoint } from "../graph/breakpoints";
-import { newAid } from "../graph/document-keys";
 import { isolated } from "../words/isolated";
 import { editor, runnerAt } from "./client";
-import { isOutcomeUnknown, pathRefused } from "./http";
 import { enginesOf, type LedOrder } from "./led-runs";
-import { lostPresses } from "./lost-presses";
 import { getRun, type Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
@@ -101,7 +98,7 @@ export type Started = Pick<RunnerApi["GroupShown"], "runs" | "failed">;
  * The rules of a version as the editor seals them, for the runner. Nothing if the editor has none or
  * does not answer: where there are rules, only its starter and owners see the run then.
  */
-async function sightOf(version: string): Promise<{ sight?: RunnerApi["Sight"] }> {
+export async function sightOf(version: string): Promise<{ sight?: RunnerApi["Sight"] }> {
   if (version === "") return {};
   try {
     const path = { version_id: version };
@@ -174,24 +171,6 @@ export function resumeRun(runner: string, run: string, watching: Watching): Prom
   return runnerAt(runner).post("/api/runs/{run}/resume", { path: { run }, body: { watching } });
 }
 
-/** Gives a run another version of its graph, by value. Its engine pauses it for that. */
-export async function modifyRun(
-  runner: string,
-  run: string,
-  version: { id: string; digest: string; umrf: string },
-  watching: Watching,
-): Promise<Run> {
-  const sight = await sightOf(version.id);
-  const body = {
-    version: version.id,
-    digest: version.digest,
-    umrf: version.umrf,
-    watching,
-    ...sight,
-  };
-  return runnerAt(runner).post("/api/runs/{run}/modify", { path: { run }, body });
-}
-
 export function useRuns(runner: string | undefined) {
   return useQuery({
     queryKey: ["runs", "list"],
@@ -218,104 +197,5 @@ export function useRun(runner: string | undefined, id: string) {
     queryKey: ["runs", "one", id],
     queryFn: ({ signal }) => getRun(runner ?? "", id, signal),
     enabled: runner !== undefined,
-  });
-}
-
-/**
- * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
- * thing is sent with the same id, so that the two count once: also after the page was loaded anew, and also one
- * after a press that was refused meanwhile, since the first may still be carried out. Where the id itself is
- * refused, the first was carried out and is over.
- */
-export async function sendPress<T>(
-  what: string,
-  send: (request: string) => Promise<T>,
-): Promise<T> {
-  const lost = lostPresses.get(what);
-  const request = lost ?? newAid();
-  lostPresses.keep(what, request);
-  try {
-    const answer = await send(request);
-    lostPresses.forget(what);
-    return answer;
-  } catch (error) {
-    const isOver = lost === undefined || pathRefused(error).endsWith("/request_id");
-    if (isOver && !isOutcomeUnknown(error)) lostPresses.forget(what);
-    throw error;
-  }
-}
-
-/** Let a held run go on, if it is still held since this moment. Robots may begin to move. */
-export function letGoOn(
-  runner: string,
-  run: string,
-  since: string,
-  watching: Watching = {},
-): Promise<Run> {
-  return sendPress(`go on ${run} ${since}`, (request) => {
-    const body = { since, request_id: request, watching };
-    return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body });
-  });
-}
-
-/** The distance that a held run goes on: one action, or all that come before another one. */
-export type StepGoal =
-  | { readonly action: string }
-  | { readonly until: string }
-  | { readonly over: string[] };
-
-/** Let a held run go on so far, if it is still held since this moment, and hold it again. */
-export function letStep(
-  runner: string,
-  run: string,
-  since: string,
-  goal: StepGoal,
-  watching: Watching = {},
-): Promise<Run> {
-  return sendPress(["step", run, since, JSON.stringify(goal)].join(" "), (request) => {
-    const body = { since, request_id: request, watching, ...goal };
-    return runnerAt(runner).post("/api/runs/{run}/step", { path: { run }, body });
-  });
-}
-
-/**
- * Set where a led run waits. To take one away is a start. `was`: those that the person saw; it is refused if
- * there are others now.
- */
-export function setRunBreakpoints(
-  runner: string,
-  run: string,
-  breakpoints: readonly RunBreakpoint[],
-  was: readonly RunBreakpoint[],
-  watching: Watching,
-): Promise<Run> {
-  const sent = { breakpoints, was } as Pick<RunnerApi["BreakpointsRequest"], "breakpoints" | "was">;
-  const body = { ...sent, watching };
-  return runnerAt(runner).put("/api/runs/{run}/breakpoints", { path: { run }, body });
-}
-
-/** Let a led run begin nothing further. What was begun goes on. */
-export function letWait(runner: string, run: string): Promise<Run> {
-  return sendPress(`wait ${run}`, (request) =>
-    runnerAt(runner).post("/api/runs/{run}/wait", {
-      path: { run },
-      body: { request_id: request },
-    }),
-  );
-}
-
-/** An outcome by the word of a person. */
-export type SaidOutcome = RunnerApi["WordRequest"]["outcome"];
-
-/** Say how an action of a led run has ended, where nothing shows it. */
-export function giveOutcome(
-  runner: string,
-  run: string,
-  said: Omit<RunnerApi["WordRequest"], "request_id">,
-): Promise<Run> {
-  const word = { ...said, reason: said.reason.trim() };
-  return sendPress(`outcome ${run} ${JSON.stringify(word)}`, (request) => {
-    const body = { ...word, request_id: request };
-    return runnerAt(runner).post("/api/runs/{run}/outcome", { path: { run }, body });
   });
 }

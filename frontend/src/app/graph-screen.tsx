@@ -166,7 +166,8 @@ function Inside({ id }: { id: string }) {
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
   const drawn = past ? replay.run : live;
-  const seen = useProgress(drawn, !past && unsure, replay.at, inside);
+  const graph = useThrottledGraph();
+  const seen = useProgress(drawn, !past && unsure, replay.at, inside, graph);
   const [waits, setWaits] = useState<Waits | null>(null);
   const progress = waits?.of === seen ? waits.progress : seen;
   useRunOnCanvas(drawn, !past && unsure, replay.at, inside);
@@ -175,7 +176,6 @@ function Inside({ id }: { id: string }) {
   // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now
   useEffect(() => seek(null), [newest, seek]);
   const begun = useLinkPart(({ seq }) => seq > 0);
-  const graph = useThrottledGraph();
   useNameColors(NAME_RANK.actors, robotNames(graph.actions));
   const seed = useSeed(runner, askedDryRun(useSearch()), graph, begun);
   const mayStart = useMay("simulate");

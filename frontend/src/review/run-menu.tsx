@@ -21,7 +21,7 @@ import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from
 import { getRun } from "../api/run-stop";
 import { type Inside, type Run, startRun } from "../api/runs";
 import { memberText } from "../graph/json-members";
-import { type Beginning, canContinue } from "../status/earlier-list";
+import { type Beginning, canContinue, isOpened, openedIn } from "../status/earlier-list";
 import { actionWords } from "../status/level-places";
 import { Segments } from "../ui/segments";
 import { isolated } from "../words/isolated";
@@ -36,6 +36,8 @@ export interface RepeatActions {
   /** The engine of each actor; of a led run. */
   robots?: Run["robots"];
   values?: Run["values"] | undefined;
+  /** Set for a run that had opened its sub-graphs. */
+  opens?: boolean;
   /** The place where it begins, if not at the entry. */
   beginning?: Beginning | undefined;
 }
@@ -157,9 +159,11 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const simulate = (which: RepeatedVersion) => {
     if (runner !== undefined) repeatRun(runner, run, which).then(show, complain);
   };
-  const again = { graph, name: run.graph_name, engines, robots: run.robots, values: run.values };
+  const opens = isOpened(run);
+  const same = { engines, robots: run.robots, values: run.values, opens };
+  const again = { graph, name: run.graph_name, ...same };
   const start = (seq: number) => onStart({ ...again, seq });
-  const beginning = { run: run.id, number: run.number, at: [], only: false };
+  const beginning = { run: run.id, number: run.number, at: [], only: false, ...openedIn(run) };
   const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);
   const close = () => setDialog(null);
   return (
@@ -345,15 +349,17 @@ async function sentGraph(runner: string, run: Run, which: RepeatedVersion): Prom
   if (which === "newest" && run.graph !== null) return newestOf(run.graph, run);
   const umrf = await fetchText(umrfUrl(runner, run.id));
   const inside = insideOf(run.subgraphs === undefined ? await getRun(runner, run.id) : run);
-  if (!run.values) return { version: run.version ?? "", digest: run.digest, umrf, inside };
-  if (run.version) {
+  if (!run.sent_digest) return { version: run.version ?? "", digest: run.digest, umrf, inside };
+  const isWhole = !isOpened(run) && run.from === undefined;
+  if (run.values && run.version && isWhole) {
     const text = await fetchText(`/api/versions/${encodeURIComponent(run.version)}`);
     return { ...readVersion(text), values: run.values };
   }
-  // Without its version there is only what was sent, which has the values and asks for nothing.
-  const { subgraphs } = inside;
-  const digest = run.sent_digest ?? run.digest;
-  return { version: "", digest, umrf, inside: { ...(subgraphs && { subgraphs }) } };
+  // Without its version, and of a part or an opened graph, there is only what was sent: it has the values and asks
+  // for nothing. What was opened has no graphs inside.
+  const { subgraphs } = isOpened(run) ? {} : inside;
+  const sent = { version: "", digest: run.sent_digest, umrf };
+  return { ...sent, inside: { ...(subgraphs && { subgraphs }) } };
 }
 
 /** Starts it; whatever was not seen is chosen, and told. */

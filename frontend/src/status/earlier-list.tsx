@@ -22,6 +22,11 @@ export function isOpened({ actions }: Pick<Run, "actions">): boolean {
   return Object.values(actions ?? {}).some(({ levels }) => levels);
 }
 
+/** Return what a start that continues a run says of the sub-graphs that it had opened. */
+export function openedIn(run: Pick<Run, "actions" | "version">): Pick<Beginning, "opened"> {
+  return isOpened(run) && run.version ? { opened: run.version } : {};
+}
+
 export type Choice = NonNullable<StartFrom["choices"]>[string];
 
 /** The choices for an action that was under way, in words. */

@@ -45,21 +45,57 @@ function isThere(told: readonly string[], way: WayInside): boolean {
   );
 }
 
-/** Progress by the keys that the actions have here; those that the run knows under no such name have none. */
+const NONE = {
+  word: "",
+  since: null,
+  took: null,
+  atMost: null,
+  visits: 0,
+  inferred: false,
+  message: null,
+};
+
+/**
+ * Return the progress of a sub-graph that a run has opened, of the actions inside. It is not known where that of one
+ * of them is not. Nothing tells how it ended itself, so that no outcome is said: only how many of them have ended.
+ */
+function foldedProgress(inside: readonly Progress[]): Progress {
+  const find = (toned: string) => inside.find(({ tone }) => tone === toned);
+  const ends = inside.find(({ word }) => /^(stopping|paused)$/.test(word));
+  const first = find("unknown") ?? find("run") ?? ends;
+  const all = inside.length;
+  const ended = inside.filter(({ tone }) => tone !== "idle").length;
+  const none = ended ? `${ended} of ${all} inside ended` : inside[0]?.word;
+  const tone = first?.tone ?? (ended < all ? "idle" : "done");
+  return { ...NONE, tone, word: first?.word ?? none ?? "" };
+}
+
+/**
+ * Progress by the keys that the actions have here; those that the run knows under no such name have none. `folded`: only
+ * of actions that stand for sub-graphs which the run has opened.
+ */
 export function progressInside(
   run: Run,
   unsure: Unsure,
   inside: GraphInRun,
+  folded = false,
 ): Map<string, Progress> {
   const keys = new Map(inside.graph.actions.map((action) => [fullName(action), action.key]));
   const found = new Map<string, Progress>();
+  const opened = new Map<string, Progress[]>();
   const places = placesOf(run);
   for (const [name, action] of Object.entries(run.actions ?? {})) {
+    const levels = action.levels ?? [];
+    const depth = levels.findIndex((_, i) => isThere(levels.slice(0, i), inside));
     const place = places.get(name);
-    if (place === undefined || !isThere(place.levels, inside)) continue;
-    const key = keys.get(place.name);
-    if (key !== undefined) found.set(key, progressOfAction(name, action, run, unsure));
+    const isOwn = !folded && place !== undefined && isThere(place.levels, inside);
+    const key = keys.get(levels[depth] ?? (isOwn ? place.name : ""));
+    if (key === undefined) continue;
+    const progress = progressOfAction(name, action, run, unsure);
+    if (depth < 0) found.set(key, progress);
+    else opened.set(key, [...(opened.get(key) ?? []), progress]);
   }
+  for (const [key, each] of opened) found.set(key, foldedProgress(each));
   return found;
 }
 
@@ -82,22 +118,31 @@ export type ProgressByAid = ReadonlyMap<string, Progress>;
 
 function keptProgress(before: ProgressByAid, now: ProgressByAid): ProgressByAid {
   if (before.size !== now.size) return now;
-  for (const [key, progress] of now) if (before.get(key) !== progress) return now;
+  for (const [key, progress] of now) if (!isSame(before.get(key), progress)) return now;
   return before;
 }
 
-/** `at`: the moment at which a replay stands, ms. `inside`: what is shown is a graph inside of the run's. */
+/** What is folded of several actions is made anew each time, and has no name. */
+function isSame(before: Progress | undefined, now: Progress): boolean {
+  return before === now || (!now.name && !before?.name && before?.word === now.word);
+}
+
+/**
+ * `at`: the moment at which a replay stands, ms. `inside`: what is shown is a graph inside of the run's. `graph`: what
+ * is shown is the graph of the run as people draw it: the run may have opened its sub-graphs.
+ */
 export function useProgress(
   run: Run | null,
   unsure: Unsure,
   at: number | null = null,
   inside: GraphInRun | null = null,
+  graph: GraphInRun["graph"] | null = null,
 ): ProgressByAid {
   const last = useRef<ProgressByAid>(new Map());
-  const found =
-    run === null || inside === null
-      ? progressByAid(run, unsure)
-      : progressInside(run, unsure, inside);
+  const found = run && inside ? progressInside(run, unsure, inside) : progressByAid(run, unsure);
+  if (run && graph && !inside)
+    for (const [key, each] of progressInside(run, unsure, { graph, names: [] }, true))
+      found.set(key, each);
   const now = progressAt(found, at);
   last.current = keptProgress(last.current, now);
   return last.current;

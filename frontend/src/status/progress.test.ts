@@ -1,6 +1,14 @@
 import { expect, test } from "vitest";
 import type { ActionRun, Run } from "../api/runs";
-import { progressByAid, progressOf, runEndText, runLabel, runStatus, visitsText } from "./progress";
+import {
+  progressByAid,
+  progressOf,
+  runEndText,
+  runLabel,
+  runStatus,
+  type Unsure,
+  visitsText,
+} from "./progress";
 import { isInRun, progressInside } from "./progress-inside";
 
 const run: Run = {
@@ -203,4 +211,44 @@ test.each(["requested", "published", "running", "paused", "stopping"] as const)(
 test("what has ended stays as it ended, whoever is heard", () => {
   const ended = heardRun({ state: "stopped", ended_at: "2026-11-26T11:59:00Z" });
   expect(runStatus(ended, DOWN)).toEqual({ tone: "stopped", word: "stopped" });
+});
+
+test("the card of an opened sub-graph says what runs inside, what is not known, and never an outcome", () => {
+  const done = { ...visit, until: visit.from, result: "true" } as const;
+  const inner = (state: string, robot = "David", ended = state === "FINISHED"): ActionRun => ({
+    ...going,
+    ...{ aid: null, state, robot, levels: ["Pick_0", "Grip_1"] },
+    visits: ended ? [done] : state === "UNINITIALIZED" ? [] : [visit],
+  });
+  const keyed = (name: string, instanceId: number) =>
+    ({ actions: [{ key: "k", name, instanceId }] }) as never;
+  const told = (states: ActionRun[], silent: Unsure = false, over = false) => {
+    const actions = Object.fromEntries(states.map((each, i) => [`Do_${i}`, each]));
+    const opened = { ...run, actions, ...(over && { ended_at: "2026-01-01T00:00:09Z" }) };
+    const own = progressInside(opened, silent, { graph: keyed("Pick", 0), names: [] }, true).get(
+      "k",
+    );
+    const below = progressInside(opened, silent, { graph: keyed("Grip", 1), names: ["Pick"] });
+    expect(below.get("k")).toEqual(own);
+    expect(progressInside(opened, silent, { graph: keyed("Pick", 0), names: [] }).get("k")).toEqual(
+      own,
+    );
+    return `${own?.tone}: ${own?.word}`;
+  };
+  const waits = inner("UNINITIALIZED");
+  expect(told([waits, waits])).toBe("idle: waits");
+  expect(told([waits, waits], false, true)).toBe("idle: did not run");
+  expect(told([inner("FINISHED"), inner("RUNNING"), waits])).toBe("run: running");
+  expect(told([inner("STOPPING"), inner("RUNNING")])).toBe("run: running");
+  expect(told([inner("STOPPING"), waits])).toBe("stopped: stopping");
+  expect(told([inner("RUNNING", "Carol"), inner("RUNNING")], new Set(["David"]))).toBe(
+    "unknown: unknown",
+  );
+  expect(told([inner("FINISHED"), inner("RUNNING")], false, true)).toBe("unknown: end not seen");
+  expect(told([{ ...inner("RUNNING"), asks: true }, waits])).toBe("unknown: outcome not known");
+  // Between two actions nothing runs.
+  expect(told([inner("FINISHED"), waits])).toBe("idle: 1 of 2 inside ended");
+  expect(told([inner("FINISHED"), inner("BYPASSED")])).toBe("done: 2 of 2 inside ended");
+  const other = { graph: keyed("Pick", 1), names: [] };
+  expect(progressInside({ ...run, actions: { Do_0: waits } }, false, other).size).toBe(0);
 });

@@ -8,7 +8,6 @@ import { useEffect } from "react";
 import { Link } from "wouter";
 import { errorText, isOutcomeUnknown } from "../api/http";
 import { CONDUCTED, engineWords } from "../api/led-runs";
-import { lostPresses } from "../api/lost-presses";
 import { useLive } from "../api/page-link";
 import { SIMULATOR } from "../api/robots";
 import { findStart, type Run, type StartFound } from "../api/runs";
@@ -74,8 +73,7 @@ function Start({ sent }: { sent: SentStart }) {
   const found = look.data;
   useEffect(() => {
     for (const run of found?.runs ?? []) live?.learn(run);
-    if (found?.queued || found?.runs.length) lostPresses.settle(sent.request);
-  }, [found, live, sent.request]);
+  }, [found, live]);
   const runs = (found?.runs ?? []).map((run) => now.runs.get(run.id) ?? run);
   const unknown = unknownWords(sent, found, look.isError || now.link === "down");
   const told = unknown === null || (found !== undefined && !found.under_way && !look.isError);

@@ -6,7 +6,8 @@ import { useMutation } from "@tanstack/react-query";
 import { errorText, isOutcomeUnknown } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
-import { letWait, type Run } from "../api/runs";
+import { letWait } from "../api/presses";
+import type { Run } from "../api/runs";
 
 /** True if a run can wait: it is led action by action, and goes on. */
 export function canWait(run: Run): boolean {

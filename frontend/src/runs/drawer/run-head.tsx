@@ -30,7 +30,7 @@ import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { colorOfName } from "../../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../../ui/times";
 import { isolated } from "../../words/isolated";
-import { ContinueButton } from "../start/begin-dialog";
+import { ContinueButton } from "../start/continue-button";
 import style from "./run-drawer.module.css";
 
 const ConfirmRestDialog = lazyPart(() =>

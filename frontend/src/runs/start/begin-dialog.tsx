@@ -1,14 +1,9 @@
-/** The looks before starts that do not begin at the entry, from a run and from the canvas. */
-import { Button } from "@mantine/core";
-import { IconPlayerSkipForward } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
-import { useVersions, versionName } from "../../api/graphs";
+import { useVersions } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { CONDUCTED } from "../../api/led-runs";
-import { useMay } from "../../api/people";
 import { SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
-import { canContinue, isOpened } from "../../status/earlier-list";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { nextLabel, notifyFailure } from "./use-start";
 
@@ -68,50 +63,5 @@ export function BeginDialog({ graph, name, settle, obstacle, onClose, ...part }:
         onClose={onClose}
       />
     </OverlayBoundary>
-  );
-}
-
-/** Offers to continue a led run that ended, where it ended. */
-export function ContinueButton({ run }: { run: Run }) {
-  const may = useMay(run.simulated ? "simulate" : "operate");
-  const graph = run.graph ?? "";
-  const versions = useVersions(graph, run.version).data ?? [];
-  const version = versions.find(({ id }) => id === run.version);
-  const [asking, setAsking] = useState(false);
-  if (!may || !canContinue(run) || version === undefined) return null;
-  return (
-    <>
-      <Button
-        size="compact-xs"
-        variant="light"
-        flex="none"
-        leftSection={<IconPlayerSkipForward size={14} aria-hidden />}
-        onClick={() => setAsking(true)}
-      >
-        Continue …
-      </Button>
-      {asking && (
-        <OverlayBoundary>
-          <StartDialog
-            graph={graph}
-            name={run.graph_name}
-            seq={version.seq}
-            label={versionName(versions, version.id)}
-            chosen={[CONDUCTED]}
-            robots={run.robots}
-            values={run.values}
-            beginning={{
-              run: run.id,
-              number: run.number,
-              at: [],
-              only: false,
-              ...(isOpened(run) && { opened: version.id }),
-            }}
-            onChosen={() => undefined}
-            onClose={() => setAsking(false)}
-          />
-        </OverlayBoundary>
-      )}
-    </>
   );
 }

@@ -48,7 +48,7 @@ test("a press whose answer got lost has the same request id after the page was l
     getItem: (key: string) => kept.get(key) ?? null,
     setItem: (key: string, text: string) => void kept.set(key, text),
   };
-  vi.stubGlobal("window", { sessionStorage });
+  vi.stubGlobal("sessionStorage", sessionStorage);
   /** Loads the page again, and presses. */
   async function loaded(answer: (kind: typeof Refusal) => Promise<string>): Promise<string> {
     vi.resetModules();
@@ -70,7 +70,7 @@ test("a press whose answer got lost has the same request id after the page was l
   const next = await loaded(() => Promise.resolve("there"));
   expect(next).not.toBe(first);
   expect(await loaded(() => Promise.resolve("there"))).not.toBe(next);
-  for (const damaged of ["{", "7", '[["a"], 1, ["queue", 2]]']) {
+  for (const damaged of ["{", "7", "null"]) {
     kept.set("aa.presses", damaged);
     expect(await loaded(() => Promise.resolve("there"))).not.toBe("");
   }

@@ -2,7 +2,8 @@
 
 import { notifications } from "@mantine/notifications";
 import { errorText, isOutcomeUnknown } from "../../api/http";
-import { type StartOrder, sendPress } from "../../api/runs";
+import { sendPress } from "../../api/presses";
+import type { StartOrder } from "../../api/runs";
 import { type LookedAtOrder, notifyFailure } from "./use-start";
 
 /** An error of a request whose outcome nobody knows: the message stays until a person closes it. */

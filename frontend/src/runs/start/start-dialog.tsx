@@ -59,6 +59,8 @@ interface Props {
   robots?: LedOrder["robots"] | null | undefined;
   /** Values to begin with: of the run that is started once more. */
   values?: StartValues | undefined;
+  /** Set if the run that is started once more had opened its sub-graphs, false if not. */
+  opens?: boolean;
   /** The place where it begins, if not at the entry. */
   beginning?: Beginning | undefined;
   onChosen: (engines: string[]) => void;
@@ -281,7 +283,7 @@ function obstacleOf(
 }
 
 /** The way in which a graph is started, and the robots of a led start. */
-function useWay({ graph, seq, chosen, robots, beginning }: Props) {
+function useWay({ graph, seq, chosen, robots, opens: wished, beginning }: Props) {
   const { now } = useLive();
   const may = useMay("operate");
   const text = useText(graph, seq);
@@ -307,7 +309,7 @@ function useWay({ graph, seq, chosen, robots, beginning }: Props) {
   const led = continues || asks || (wanted ?? (several || waits));
   const offered = !continues && !asks && (several || waits || led || mayLead);
   const cast = castOf(actors, picked, now.engines, may);
-  const [wish, setOpens] = useState(before?.levels === "opened");
+  const [wish, setOpens] = useState(wished ?? before?.levels === "opened");
   const mayOpen = led && beginning === undefined && (graphs?.length ?? 0) > 0;
   const opened = mayOpen && wish;
   const opens = opened || beginning?.opened !== undefined;

@@ -1,0 +1,154 @@
+/** What people send to runs: presses that let led runs go on, each of which counts once, and another version. */
+import type { RunBreakpoint } from "../graph/breakpoints";
+import { newAid } from "../graph/document-keys";
+import { runnerAt } from "./client";
+import { isOutcomeUnknown, pathRefused } from "./http";
+import { type Run, sightOf, type Watching } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+const KEY = "aa.presses";
+const LONGEST = 20_000; // characters of what is kept beyond this page
+
+function stored(): [string, string][] {
+  try {
+    return Object.entries(JSON.parse(sessionStorage.getItem(KEY) ?? "{}"));
+  } catch {
+    return []; // a browser may forbid it
+  }
+}
+
+/**
+ * Request ids of presses whose answers got lost, by what was pressed. They live as long as the tab: a press that is
+ * made again after the page was loaded anew counts once with the first.
+ */
+const lostPresses = new Map(stored());
+
+/** Keep the lost presses for when the page is loaded anew. */
+function keepLostPresses(): void {
+  const short = [...lostPresses].filter(([what]) => what.length < LONGEST);
+  try {
+    sessionStorage.setItem(KEY, JSON.stringify(Object.fromEntries(short)));
+  } catch {
+    // A tab that stores nothing still knows them until it is loaded anew.
+  }
+}
+
+/**
+ * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
+ * thing is sent with the same id, so that the two count once: also after the page was loaded anew, and also one
+ * after a press that was refused meanwhile, since the first may still be carried out. Where the id itself is
+ * refused, the first was carried out and is over.
+ */
+export async function sendPress<T>(
+  what: string,
+  send: (request: string) => Promise<T>,
+): Promise<T> {
+  const lost = lostPresses.get(what);
+  const request = lost ?? newAid();
+  lostPresses.set(what, request);
+  keepLostPresses();
+  try {
+    const answer = await send(request);
+    lostPresses.delete(what);
+    return answer;
+  } catch (error) {
+    const isOver = lost === undefined || pathRefused(error).endsWith("/request_id");
+    if (isOver && !isOutcomeUnknown(error)) lostPresses.delete(what);
+    throw error;
+  } finally {
+    keepLostPresses();
+  }
+}
+
+/** Let a held run go on, if it is still held since this moment. Robots may begin to move. */
+export function letGoOn(
+  runner: string,
+  run: string,
+  since: string,
+  watching: Watching = {},
+): Promise<Run> {
+  return sendPress(`go on ${run} ${since}`, (request) => {
+    const body = { since, request_id: request, watching };
+    return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body });
+  });
+}
+
+/** The distance that a held run goes on: one action, or all that come before another one. */
+export type StepGoal =
+  | { readonly action: string }
+  | { readonly until: string }
+  | { readonly over: string[] };
+
+/** Let a held run go on so far, if it is still held since this moment, and hold it again. */
+export function letStep(
+  runner: string,
+  run: string,
+  since: string,
+  goal: StepGoal,
+  watching: Watching = {},
+): Promise<Run> {
+  return sendPress(["step", run, since, JSON.stringify(goal)].join(" "), (request) => {
+    const body = { since, request_id: request, watching, ...goal };
+    return runnerAt(runner).post("/api/runs/{run}/step", { path: { run }, body });
+  });
+}
+
+/**
+ * Set where a led run waits. To take one away is a start. `was`: those that the person saw; it is refused if
+ * there are others now.
+ */
+export function setRunBreakpoints(
+  runner: string,
+  run: string,
+  breakpoints: readonly RunBreakpoint[],
+  was: readonly RunBreakpoint[],
+  watching: Watching,
+): Promise<Run> {
+  const sent = { breakpoints, was } as Pick<RunnerApi["BreakpointsRequest"], "breakpoints" | "was">;
+  const body = { ...sent, watching };
+  return runnerAt(runner).put("/api/runs/{run}/breakpoints", { path: { run }, body });
+}
+
+/** Let a led run begin nothing further. What was begun goes on. */
+export function letWait(runner: string, run: string): Promise<Run> {
+  return sendPress(`wait ${run}`, (request) =>
+    runnerAt(runner).post("/api/runs/{run}/wait", {
+      path: { run },
+      body: { request_id: request },
+    }),
+  );
+}
+
+/** An outcome by the word of a person. */
+export type SaidOutcome = RunnerApi["WordRequest"]["outcome"];
+
+/** Say how an action of a led run has ended, where nothing shows it. */
+export function giveOutcome(
+  runner: string,
+  run: string,
+  said: Omit<RunnerApi["WordRequest"], "request_id">,
+): Promise<Run> {
+  const word = { ...said, reason: said.reason.trim() };
+  return sendPress(`outcome ${run} ${JSON.stringify(word)}`, (request) => {
+    const body = { ...word, request_id: request };
+    return runnerAt(runner).post("/api/runs/{run}/outcome", { path: { run }, body });
+  });
+}
+
+/** Gives a run another version of its graph, by value. Its engine pauses it for that. */
+export async function modifyRun(
+  runner: string,
+  run: string,
+  version: { id: string; digest: string; umrf: string },
+  watching: Watching,
+): Promise<Run> {
+  const sight = await sightOf(version.id);
+  const body = {
+    version: version.id,
+    digest: version.digest,
+    umrf: version.umrf,
+    watching,
+    ...sight,
+  };
+  return runnerAt(runner).post("/api/runs/{run}/modify", { path: { run }, body });
+}
