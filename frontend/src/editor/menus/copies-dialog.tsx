@@ -89,7 +89,7 @@ export function CopiesDialog({ context, actions, onClose }: Props) {
   return (
     <Modal opened onClose={onClose} title={`Duplicate ${isolated(what)} with …`} size="28rem">
       <form
-        className="stack"
+        className="stack gap-75"
         onSubmit={(event) => {
           event.preventDefault();
           if (isReady) submit();

@@ -58,7 +58,7 @@ function TriesForm({ context, action, onClose }: Props) {
   };
   return (
     <form
-      className="stack"
+      className="stack gap-75"
       onSubmit={(event) => {
         event.preventDefault();
         submit();
@@ -101,7 +101,7 @@ export function TriesDialog({ context, action, onClose }: Props) {
       {why === null ? (
         <TriesForm {...{ context, action, onClose }} />
       ) : (
-        <div className="stack">
+        <div className="stack gap-75">
           <p className="m-0">It cannot be drawn so that the engine tries it again. {why}</p>
           <Group justify="flex-end">
             <Button onClick={onClose} data-autofocus>
