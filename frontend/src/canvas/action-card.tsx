@@ -136,7 +136,7 @@ export const ActionCard = memo(function ActionCard({
       data-other={other === null ? undefined : true}
       data-selected={selected || undefined}
       data-tone={progress?.tone}
-      data-name={action.name}
+      data-name={shownName(action.name)}
       data-state={progress?.word}
       data-letter={STATE_LETTER[progress?.tone ?? "idle"] || undefined}
       data-ghost={action.missing || undefined}

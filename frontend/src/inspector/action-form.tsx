@@ -5,8 +5,9 @@ import type { ReactNode } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, renameDocument, setField } from "../graph/edit";
 import type { Action } from "../graph/model";
-import { shownName } from "../graph/questions";
+import { isReadyMade, shownName } from "../graph/questions";
 import { DraftInput } from "../ui/draft-input";
+import { isolated } from "../words/isolated";
 import { ArrowList } from "./arrow-list";
 import { ActionBreakpoint } from "./breakpoint-field";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
@@ -53,7 +54,15 @@ export function ActionForm({ action }: { action: Action }) {
   return (
     <div className={style.form} data-form={action.key}>
       <div className={style.nameRow}>
-        <NameField action={action} onRename={(name) => rename(doc, action.key, name)} />
+        <NameField
+          action={action}
+          description={
+            isReadyMade(action) && (
+              <span className="quiet-12">{isolated(shownName(action.name))}, as files call it</span>
+            )
+          }
+          onRename={(name) => rename(doc, action.key, name)}
+        />
         <SharedField of={action.key} field="number">
           <DraftInput
             label="Number"

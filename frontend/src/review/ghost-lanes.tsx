@@ -5,7 +5,7 @@ import type { Run, Visit } from "../api/runs";
 import { barOf, shareOf, type TimeAxis, ticksOf, wholeSpan } from "../status/lanes/axis";
 import { AllLevels, LaneToggle, type OpenLanes, useOpenLanes } from "../status/lanes/lane-row";
 import { openLanes } from "../status/lanes/lanes";
-import { wayWords } from "../status/level-places";
+import { spaced, wayWords } from "../status/level-places";
 import { visitBegin, visitEnd } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Segments } from "../ui/segments";
@@ -98,7 +98,7 @@ function GhostName({ action, parts, onPick, inside }: Omit<LaneProps, "steps" | 
         onClick={() => onPick(aid)}
       >
         {parts && <b className={style.mark}>1</b>}
-        <bdi>{label}</bdi>
+        <bdi>{spaced(label)}</bdi>
       </button>
     </span>
   );

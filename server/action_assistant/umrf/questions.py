@@ -288,6 +288,12 @@ def title_of(name: str) -> str:
     return _TITLES[name]
 
 
+def spoken(full_name: str) -> str:
+    """Return an action as people call it: `AaConfirm_0` is Confirm 0; other names stay."""
+    name, _, number = full_name.rpartition("_")
+    return f"{_TITLES[name]} {number}" if name in _TITLES else full_name
+
+
 # --- what they ask, and how long they wait ----------------------------------------------------------
 
 

@@ -1,9 +1,10 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
+import type { Run } from "../../api/runs";
 import type { PartOnCard } from "../../canvas/editor-store";
 import { CARD } from "../../canvas/geometry/ranks";
 import type { Progress } from "../../status/progress";
-import { followedBox, followingViewport, runningInside, runningKeys } from "./follow-run";
+import { followedBox, followingViewport, heldKeys, runningInside, runningKeys } from "./follow-run";
 
 const frame = { width: 900, height: 500 };
 const card = (x: number, y: number) => ({ x, y, width: CARD.width, height: CARD.height });
@@ -43,6 +44,20 @@ test("all running actions are shown if they fit, else the latest", () => {
   expect(box(["b", "a"])).toMatchObject({ x: 0, width: 300 + CARD.width });
   expect(box(["far", "a"])).toMatchObject({ x: 9_000, width: CARD.width });
   expect(box(["gone"])).toBeNull();
+});
+
+test("a run that waits before actions is followed to them, until it is over", () => {
+  const run = (more: object) =>
+    ({
+      ended_at: null,
+      held: { next: [{ action: "Grip_0" }, { action: "Deep_0" }] },
+      actions: { Grip_0: { aid: "g" }, Deep_0: { aid: null } },
+      ...more,
+    }) as unknown as Run;
+  expect(heldKeys(run({}))).toBe("g");
+  expect(heldKeys(run({ held: null }))).toBe("");
+  expect(heldKeys(run({ ended_at: "2026-01-01T00:00:00Z" }))).toBe("");
+  expect(heldKeys(undefined)).toBe("");
 });
 
 test("an action that runs in a folded frame is followed at its block", () => {

@@ -1,6 +1,7 @@
 /** Moves the view along with a run until the person moves it. */
 import type { ReactFlowInstance, Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
+import type { Run } from "../../api/runs";
 import { type ExpandedGraphs, useEditorStore } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import type { Positions, Sizes } from "../../canvas/geometry/ranks";
@@ -9,6 +10,7 @@ import { tick } from "../../clock/server-clock";
 import { GRID } from "../../edit-actions/editor-context";
 import type { Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
+import { useWatched } from "../../ui/watched";
 
 const css = ({ x, y, zoom }: Viewport) => `translate(${x}px, ${y}px) scale(${zoom})`;
 
@@ -82,6 +84,12 @@ export function runningKeys(
     .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
     .map(([key]) => blockOf?.get(key) ?? key);
   return [...new Set(keys)];
+}
+
+/** Return the actions before which a held run waits, as keys of its graph, in one text. */
+export function heldKeys(run: Run | undefined): string {
+  const next = run?.ended_at === null ? (run.held?.next ?? []) : [];
+  return next.flatMap(({ action }) => run?.actions?.[action]?.aid ?? []).join(" ");
 }
 
 interface DrawnPlaces {
@@ -209,10 +217,17 @@ interface Followed {
 export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }: Followed) {
   const [left, setLeft] = useState<string | null>(null);
   const lost = run !== null && left === run;
+  const store = useEditorStore();
+  const held = useWatched(store.run, (shown) =>
+    shown?.run.id === run && shown?.at === null ? heldKeys(shown.run) : "",
+  );
+  const begun = run === null || lost ? [] : runningKeys(progress, blockOf);
+  // Where nothing runs, a person decides about what waits: they look at that.
+  const waiting = lost || held === "" || begun.length > 0 ? [] : held.split(" ");
   const { keys: running, ...drawn } = runningInside(
-    run === null || lost ? [] : runningKeys(progress, blockOf),
+    [...begun, ...waiting.map((key) => blockOf?.get(key) ?? key)],
     now.current,
-    useEditorStore().expanded.now(),
+    store.expanded.now(),
   );
   const key = running.join(" ");
   const { isBusy, release } = useHandsOn(frame);

@@ -24,6 +24,7 @@ from action_assistant.runner.start.admission import Prepared, PreparedPieces
 from action_assistant.runner.start.preflight import SHOWN, Item, Preflight, Verdict, counted
 from action_assistant.runner.start.start_from import beginning_text, is_doubtful
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.questions import spoken
 
 #: The stream of all words about indexing.
 STREAM: Final = "indexing"
@@ -100,8 +101,8 @@ def _moving(ready: PreparedPieces) -> Item:
 
 def _asking(ready: PreparedPieces) -> Item:
     """Return the pre-flight item that says which actions people answer, and for which the runner waits."""
-    people = [name for name, each in ready.asked.items() if each.by == "people"]
-    waits = [name for name, each in ready.asked.items() if each.by == "runner"]
+    people = [spoken(name) for name, each in ready.asked.items() if each.by == "people"]
+    waits = [spoken(name) for name, each in ready.asked.items() if each.by == "runner"]
     texts: list[str] = []
     if people:
         texts.append(f"People answer {_listed(people)}.")
