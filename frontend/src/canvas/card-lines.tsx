@@ -8,6 +8,7 @@ const TITLES: Readonly<Record<CardRow["kind"], string>> = {
   value: "",
   from: ", from an output",
   open: ", still to fill in",
+  none: "",
   seen: ", as the engine reported it",
 };
 

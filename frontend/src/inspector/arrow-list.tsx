@@ -121,7 +121,8 @@ export function ArrowList({ action }: { action: Action }) {
       </ul>
       {out.length === 0 && !connecting && (
         <p className="m-0 ink2">
-          Nothing follows. Drag from one of the four outcomes under the card, or press Connect.
+          Nothing follows. Drag from one of the four outcomes at the side of the card, or press
+          Connect.
         </p>
       )}
       {connecting && <Connect action={action} onDone={() => setConnecting(false)} />}

@@ -211,7 +211,6 @@ function stateWords({ state, closed, next, total }: Repeat): string {
 function Found({ repeat, runner }: { repeat: Repeat; runner: string }) {
   const range = rangeWords(repeat.cells.map(({ run }) => run?.took));
   const isDoubted = repeat.closed !== null && repeat.closed.why !== "complete";
-  const started = repeat.cells.filter(({ run }) => run !== null).length;
   return (
     <div className={style.inner}>
       <div className="page-head">
@@ -225,8 +224,8 @@ function Found({ repeat, runner }: { repeat: Repeat; runner: string }) {
         {repeat.seed !== null && ` Shuffled by the seed ${repeat.seed}.`}
         {repeat.reopened_by && ` Opened again by ${isolated(repeat.reopened_by.name)}.`}
       </p>
-      <progress className={style.progress} max={repeat.total} value={started}>
-        {started} of {repeat.total}
+      <progress className={style.progress} max={repeat.total} value={repeat.finished}>
+        {repeat.finished} of {repeat.total}
       </progress>
       <Commands repeat={repeat} runner={runner} />
       <Table repeat={repeat} />

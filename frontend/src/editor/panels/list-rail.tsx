@@ -108,7 +108,7 @@ function RailButton({ name, icon, open, more, onPress }: RailButtonProps) {
 function ProblemsButton({ told }: { told: readonly ProblemGroup[] }) {
   const { setPanel } = useEditorContext();
   const counts = countsOf(told);
-  const { wrong, fillIn } = counts;
+  const { wrong, fillIn, warnings } = counts;
   return (
     <RailButton
       name="Problems"
@@ -117,10 +117,11 @@ function ProblemsButton({ told }: { told: readonly ProblemGroup[] }) {
       icon={
         <span className={style.counted}>
           <IconAlertTriangle size={19} />
-          {wrong + fillIn > 0 && (
+          {wrong + fillIn + warnings > 0 && (
             <span className={style.counts}>
               {wrong > 0 && <b data-kind="wrong">{wrong}</b>}
               {fillIn > 0 && <b data-kind="fill-in">{fillIn}</b>}
+              {warnings > 0 && <b data-kind="warning">{warnings}</b>}
             </span>
           )}
         </span>

@@ -2,6 +2,7 @@ import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { mapsOf } from "../document-keys";
 import { addAction, connect, setRemap } from "../edit";
+import type { Parameter } from "../model";
 import { readGraph } from "../read";
 import { cardRows } from "./card-rows";
 import { dataFlowOf } from "./data-flow";
@@ -45,6 +46,15 @@ test("a card has a row for each input, one for a point, and what waits for a val
     "paint from Look.colour",
     "force open ?",
   ]);
+});
+
+test("an input that needs no value is nothing to fill in, and comes last", () => {
+  const empty = (path: string, required: boolean) => ({
+    path,
+    text: JSON.stringify({ pvf_type: "number", pvf_required: required }),
+  });
+  const inputs = [empty("deadline_s", false), empty("load", true)] as Parameter[];
+  expect(told(cardRows(inputs))).toEqual(["load open ?", "deadline_s none no value"]);
 });
 
 test("in a run the values that were reported stand in their place, and only those", () => {

@@ -8,8 +8,8 @@ import { shown } from "./values";
 
 export interface CardRow {
   readonly name: string;
-  /** `seen`: the engine reported it in a run. `open`: it has no value and no giver. */
-  readonly kind: "value" | "from" | "open" | "seen";
+  /** `seen`: the engine reported it in a run. `open`: it needs a value and has none; `none`: it needs none. */
+  readonly kind: "value" | "from" | "open" | "none" | "seen";
   /** The value, or who gives it: `IsValveClosed`, with the output where that is called otherwise. */
   readonly text: string;
 }
@@ -47,11 +47,14 @@ function rowOf(
     const field = readValue(input);
     return field.value === null ? null : shown(field).replace(/\s+/g, " ");
   });
-  if (values.every((value) => value === null)) return { name, kind: "open", text: "?" };
+  if (values.every((value) => value === null)) {
+    const needed = inputs.some((input) => readValue(input).required);
+    return needed ? { name, kind: "open", text: "?" } : { name, kind: "none", text: "no value" };
+  }
   return { name, kind: "value", text: values.map((value) => value ?? "?").join(" ") };
 }
 
-/** Returns the rows of a card: first inputs with a value or a giver, then those that still need one. */
+/** Returns the rows of a card: first inputs with a value or a giver, then those that need one, then the others. */
 export function cardRows(
   inputs: readonly Parameter[],
   givers?: InputGivers,
@@ -68,5 +71,6 @@ export function cardRows(
     const members = block.rows.flatMap((row) => row.members.map(({ parameter }) => parameter));
     return [rowOf(pathWords(block.prefix.slice(0, -1)), members, givers, reported)];
   });
-  return [...rows.filter(({ kind }) => kind !== "open"), ...rows.filter((r) => r.kind === "open")];
+  const rank = ({ kind }: CardRow) => (kind === "open" ? 1 : kind === "none" ? 2 : 0);
+  return rows.sort((a, b) => rank(a) - rank(b));
 }

@@ -123,7 +123,7 @@ function AllowedValue({ label, name, field, end, write }: ValueProps) {
       <Select
         label={label}
         aria-label={name}
-        placeholder={inLibrary ? "no value" : "fill in"}
+        placeholder={field.required && !field.locked && !inLibrary ? "fill in" : "no value"}
         clearable
         flex={1}
         data={[
