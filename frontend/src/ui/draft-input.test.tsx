@@ -122,6 +122,19 @@ test("a field that waits for leaving is written when the page goes, too", () => 
   expect(onCommit.mock.calls).toEqual([["lab"]]);
 });
 
+test("Enter writes a field that waits for leaving, which keeps the caret", async () => {
+  render(<DraftChoice label="Robot" data={["a", "b"]} value="a" onCommit={onCommit} />);
+  type("lab");
+  const field = document.querySelector("input");
+  field?.focus();
+  await act(async () => {
+    field?.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+  });
+  expect(onCommit.mock.calls).toEqual([["lab"]]);
+  expect(pendingDrafts.counts()).toEqual({ writing: 0, waiting: 0 });
+  expect(document.activeElement).toBe(field);
+});
+
 test("a draft that does not fit waits for its person, who is asked before the page goes", () => {
   render(<DraftInput label="Number" value="1" check={number} onCommit={onCommit} />);
   const leave = () => {

@@ -94,7 +94,10 @@ export function DraftChoice({ label, data, placeholder, leftSection, ...options 
         field.commit();
       }}
       onKeyDown={(event) => {
-        if (keyOf(event) === "Escape") field.discard();
+        const key = keyOf(event);
+        if (key === "Escape") field.discard();
+        // A proposal that Enter takes comes first.
+        if (key === "Enter") queueMicrotask(field.commit);
       }}
     />
   );

@@ -3,9 +3,9 @@ import { afterEach, expect, test, vi } from "vitest";
 
 const load = async () => {
   vi.resetModules(); // as a reload of the page does
-  const { keptTexts, textScope } = await import("./kept-texts");
+  const { keptTexts, textScope, startScope } = await import("./kept-texts");
   const { pendingDrafts } = await import("./drafts");
-  return { keptTexts, textScope, pendingDrafts };
+  return { keptTexts, textScope, startScope, pendingDrafts };
 };
 
 afterEach(() => {
@@ -22,6 +22,13 @@ test("a text that waits for its button survives a reload, for its person only", 
   expect([again.count(ada), again.count(textScope("g1", "bob"))]).toEqual([1, 0]);
   again.set(`${ada}comment/a1`, "");
   expect((await load()).keptTexts.count(ada)).toBe(0);
+});
+
+test("what is typed for a start is kept, and no draft of the graph", async () => {
+  const { keptTexts, textScope, startScope } = await load();
+  keptTexts.set(`${startScope("g1", "ada")}repeat`, "0.2");
+  expect(keptTexts.count(textScope("g1", "ada"))).toBe(0);
+  expect((await load()).keptTexts.get(`${startScope("g1", "ada")}repeat`)).toBe("0.2");
 });
 
 test("a text that the tab does not keep is a draft of this page, so its person is asked", async () => {

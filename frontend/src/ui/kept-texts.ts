@@ -9,6 +9,10 @@ const LONGEST = 1 << 20;
 /** The beginning of the keys of one person's texts in one graph. */
 export const textScope = (graph: string, person: string): string => `${graph}/${person}/`;
 
+/** The beginning of the keys of what somebody typed for a start: no part of the graph, and so not waiting for it. */
+export const startScope = (graph: string, person: string): string =>
+  `start ${textScope(graph, person)}`;
+
 function stored(): Map<string, string> {
   try {
     const keys = Object.keys(sessionStorage).filter((key) => key.startsWith(PREFIX));

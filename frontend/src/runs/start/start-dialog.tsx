@@ -5,6 +5,7 @@ import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
+import { useVersions } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
@@ -24,7 +25,7 @@ import { askingRobots, ConfirmFirst, SecondPerson } from "../../status/start-rem
 import { EngineLabel } from "../../status/state-label";
 import { lineWords, valueLines } from "../../status/value-words";
 import { useWatching, WatchTicks } from "../../status/watching";
-import { textScope, useKeptText } from "../../ui/kept-texts";
+import { startScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
 import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
@@ -43,6 +44,7 @@ import {
 import { PreflightList } from "./preflight-list";
 import { mayWait, QueueOffer } from "./queue-choice";
 import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
+import { sameVersion } from "./same-version";
 import { useAllBreakpoints, useBreakpoints } from "./start-breakpoints";
 import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";
@@ -232,9 +234,12 @@ function Exactly({
   engines,
   moves,
   values,
+  same,
 }: {
   name: string;
   label: string;
+  /** The name of an earlier version with the same graph; "" for none. */
+  same: string;
   digest: string;
   engines: readonly string[];
   /** The robots that move in a led run; "" for other starts. */
@@ -246,7 +251,10 @@ function Exactly({
       <dt className="ink2">Graph</dt>
       <dd>{name}</dd>
       <dt className="ink2">Version</dt>
-      <dd>{label}</dd>
+      <dd>
+        {label}
+        {same !== "" && <span className="quiet-xs">, the same graph as {same}</span>}
+      </dd>
       <dt className="ink2">Digest</dt>
       <dd className="weight-400 mono">{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
       <dt className="ink2">{engines.length > 1 ? "Robots" : "On"}</dt>
@@ -349,7 +357,7 @@ export function StartDialog(props: Props) {
   const asked = led ? (way.missing === null ? [CONDUCTED] : []) : whole;
   const { person } = usePerson();
   // A reason counts for this moment on these robots only.
-  const place = `${textScope(graph, person.id)}start/${seq}/${led ? "led/" : ""}${engines.join("/")}`;
+  const place = `${startScope(graph, person.id)}start/${seq}/${led ? "led/" : ""}${engines.join("/")}`;
   const [reason, setReason] = useKeptText(place);
   const { now } = useLive();
   const { behaviours, choice } = useBehaviours(!led && engines.includes(SIMULATOR));
@@ -360,7 +368,7 @@ export function StartDialog(props: Props) {
   const { breakpoints } = way;
   const { from, ...begins } = useStartFrom(
     beginning,
-    `${textScope(graph, person.id)}continue/${beginning?.run ?? ""}`,
+    `${startScope(graph, person.id)}continue/${beginning?.run ?? ""}`,
   );
   const place_ = beginning && { run: beginning.run, at: [...beginning.at], only: beginning.only };
   const given = useAskedValues(graph, way.text.data, props.values, () => setReason(""), place_);
@@ -371,7 +379,7 @@ export function StartDialog(props: Props) {
   const error = way.wrong ?? given.error ?? lookError;
   const start = useStart(graph);
   const mayMove = engines.some((engine) => engine !== SIMULATOR);
-  const repeats = useRepeatChoice(given.asked, mayMove, `${textScope(graph, person.id)}repeat`);
+  const repeats = useRepeatChoice(given.asked, mayMove, `${startScope(graph, person.id)}repeat`);
   const open = useOpenRepeat(graph);
   const mayRepeat = beginning === undefined && asked.length === 1 && !said.drill;
   const repeat = mayRepeat ? repeats.order : null;
@@ -379,6 +387,7 @@ export function StartDialog(props: Props) {
   const earlier = looks?.find((each) => each.earlier)?.earlier;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
   const { digest = "", tree_digest: tree } = looks?.find((each) => each.digest !== "") ?? {};
+  const same = sameVersion(useVersions(graph).data ?? [], { digest, tree, seq });
   const why =
     now.link === "down"
       ? "The runner does not answer"
@@ -589,6 +598,7 @@ export function StartDialog(props: Props) {
           engines={moving}
           moves={led && way.missing === null ? movesWords(castFor(cast, moving)) : ""}
           values={values}
+          same={same}
         />
         <StartButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
