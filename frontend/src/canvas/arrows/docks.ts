@@ -1,13 +1,5 @@
 /** Docks: the places where lines leave and enter cards, and where their pills stand. Pure. */
-import {
-  BoxIndex,
-  boxOf,
-  type FlowBox,
-  type PillSize,
-  type Scene,
-  type SceneLine,
-  STEP,
-} from "./scene";
+import { BoxIndex, boxOf, type FlowBox, type Scene, type SceneLine, STEP } from "./scene";
 
 /**
  * Coordinates along the direction of the graph are `u` and `column`, across it `v` and `row`; rows
@@ -24,8 +16,6 @@ export interface Dock {
   readonly to: { readonly u: number; readonly v: number };
   /** The box of the pill; null if there is no room for it beside the card. */
   readonly pill: FlowBox | null;
-  /** The pill has room for outcomes and response only. */
-  readonly lean: boolean;
   /** The piece along the card to a pill beyond its corner. */
   readonly link: FlowBox | null;
   /** Lines with the same end may lie on each other, and so may lines with the same start. */
@@ -145,13 +135,9 @@ const ASIDE = 1e6;
 
 /**
  * Modes in which pills are tried: such that lines are straight, then centred on the side of the
- * card, then with outcomes and responses only, then without pills.
+ * card, then without pills.
  */
-type Docking = "straight" | "centred" | "lean" | "bare";
-
-/** Return a pill with nothing but outcomes and response. */
-export const leanOf = <P extends PillSize | null>(pill: P): P =>
-  pill?.lean === undefined ? pill : { ...pill, width: pill.lean };
+type Docking = "straight" | "centred" | "bare";
 
 /** Chooses the docks of all lines of a scene: first where lines enter cards, then where they leave them. */
 export class DockPlan {
@@ -229,7 +215,7 @@ export class DockPlan {
     const apart = lines.map(({ line }, i) => {
       const before = lines[i - 1]?.line;
       return before?.source === line.source
-        ? Math.max(gap, rowsBetween(before.pill, line.pill, direction))
+        ? Math.max(gap, rowsBetween(before, line, direction))
         : gap;
     });
     const fits = apart.slice(1).reduce((sum, rows) => sum + rows, 1) <= room;
@@ -257,8 +243,6 @@ export class DockPlan {
     docks: Docking = lines.length <= MOST_DOCKED ? "straight" : "bare",
   ): Dock[] {
     const docked = docks !== "bare";
-    const lean = docks === "lean";
-    const sizeOf = ({ line }: DockDraft) => (lean ? leanOf(line.pill) : line.pill);
     const rank = ({ source, target, back, into }: DockDraft) =>
       back && straightRow(source, target) !== null ? ASIDE : back ? center(target) : this.v(into);
     lines.sort((a, b) => rank(a) - rank(b) || a.order - b.order);
@@ -266,9 +250,9 @@ export class DockPlan {
     if (!first) return [];
     const { source } = first;
     const middle = Math.round((source.low + source.high) / 2);
-    const gaps = lines.map((draft, i) => {
-      const before = lines[i - 1];
-      return before ? rowsBetween(sizeOf(before), sizeOf(draft), direction) : 1;
+    const gaps = lines.map(({ line }, i) => {
+      const before = lines[i - 1]?.line;
+      return before ? rowsBetween(before, line, direction) : 1;
     });
     const total = gaps.slice(1).reduce((sum, gap) => sum + gap, 0);
     let at = middle - total / 2;
@@ -281,16 +265,15 @@ export class DockPlan {
     });
     const beyond = docked && lines.some(({ line }) => line.pill !== null) ? total : 0;
     const rows = slotRows(slots, source, beyond);
-    const pills = lines.map((draft, i) => {
+    const pills = lines.map(({ line }, i) => {
       const v = this.v(rows[i] ?? middle);
-      const size = sizeOf(draft);
-      return docked && size ? this.pillBox(source.box.u1, v, size, direction) : null;
+      return docked && line.pill ? this.pillBox(source.box.u1, v, line.pill, direction) : null;
     });
     // All pills or none: a line without a pill would leave between those of the others.
     if (docked && !pills.every((pill) => pill === null || this.isFree(pill, source)))
-      return this.leave(lines, direction, nextDocking(docks, lines));
+      return this.leave(lines, direction, docks === "straight" ? "centred" : "bare");
     if (docked) for (const pill of pills) if (pill) this.pills.add(pill);
-    return lines.map((draft, i) => dockOf(draft, rows[i] ?? middle, pills[i] ?? null, lean, this));
+    return lines.map((draft, i) => dockOf(draft, rows[i] ?? middle, pills[i] ?? null, this));
   }
 
   private pillBox(
@@ -320,19 +303,9 @@ export class DockPlan {
   }
 }
 
-function nextDocking(tried: Docking, lines: readonly DockDraft[]): Docking {
-  if (tried === "straight") return "centred";
-  const some = tried === "centred" && lines.some(({ line }) => line.pill?.lean !== undefined);
-  return some ? "lean" : "bare";
-}
-
 /** Return the number of rows that the pills of two neighbouring lines need between them. */
-function rowsBetween(
-  a: PillSize | null,
-  b: PillSize | null,
-  direction: Scene["direction"],
-): number {
-  const across = (pill: PillSize | null) =>
+function rowsBetween(a: SceneLine, b: SceneLine, direction: Scene["direction"]): number {
+  const across = ({ pill }: SceneLine) =>
     pill === null ? BARE : direction === "right" ? pill.height : pill.width;
   return Math.max(1, Math.ceil(((across(a) + across(b)) / 2 + BESIDE_PILL) / STEP));
 }
@@ -348,7 +321,6 @@ function dockOf(
   draft: DockDraft,
   row: number,
   pill: FlowBox | null,
-  lean: boolean,
   plan: Pick<DockPlan, "v">,
 ): Dock {
   const { line, source, target, into } = draft;
@@ -362,7 +334,6 @@ function dockOf(
     end: { column: endColumn(draft), row: into },
     to: { u: target.box.u0, v: plan.v(into) },
     pill,
-    lean: lean && line.pill?.lean !== undefined,
     link: at === row ? null : { u0: side, u1: side + LINK, ...between(plan.v(at), plan.v(row)) },
     sharesStart: `${line.source} ${column} ${row}`,
     sharesEnd: `${line.target} ${into}`,

@@ -54,7 +54,7 @@ export function lineNow(known: RoutedLine | undefined, simple: RoutedLine): Rout
       ? known
       : { ...known, pill };
   const points = stretched(old, first, last, known.direction === "right" ? 0 : 1);
-  const lean = pill === simple.pill ? (simple.lean ?? false) : (known.lean ?? false);
+  const lean = pill === known.pill && known.lean === true;
   const { ends, docked, waypoints } = simple;
   return points ? { ...known, ends, points, pill, docked, lean, waypoints } : simple;
 }

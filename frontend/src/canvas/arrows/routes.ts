@@ -1,5 +1,5 @@
 /** Routes the lines of a scene: all of them, or only those near something that has moved. Pure. */
-import { type Dock, DockPlan, leanOf } from "./docks";
+import { type Dock, DockPlan } from "./docks";
 import { BLOCKED, FREE, NEAR, Raster } from "./raster";
 import { freeCells, Router, routeThrough, straightened } from "./router";
 import { BoxIndex, boxOf, type FlowBox, type Point, type Scene, STEP } from "./scene";
@@ -284,8 +284,7 @@ class Routing {
       const pill = dock.pill && middleOf(dock.pill, scene.direction);
       const waypoints = canvasPoints(waypointsOf(dock, scene), plan, scene);
       const { direction } = scene;
-      const { lean } = dock;
-      lines.set(id, { id, direction, ends, points, pill, docked, lean, waypoints, simple: false });
+      lines.set(id, { id, direction, ends, points, pill, docked, waypoints, simple: false });
       if (!docked && dock.line.pill) loose.push({ task, points });
     }
     this.placeLoose(loose, lines, raster);
@@ -307,7 +306,8 @@ class Routing {
       const whole = task.dock.line.pill;
       if (!line || !whole) continue;
       this.mark(task, -1);
-      const sizes = whole.lean === undefined ? [whole] : [whole, leanOf(whole)];
+      const { lean = whole.width } = whole;
+      const sizes = lean === whole.width ? [whole] : [whole, { ...whole, width: lean }];
       const tries = sizes.flatMap((size) => LOOSE_GAPS.map((gaps) => [size, gaps] as const));
       for (const [size, [cards, others]] of tries) {
         const boxAt = ([x, y]: Point) =>

@@ -82,7 +82,6 @@ export function simpleLines(scene: Scene): Map<string, RoutedLine> {
           points: simplified(whole),
           pill,
           docked,
-          lean: dock.lean,
           waypoints: canvasPoints(waypoints, plan, scene),
           simple: true,
         },
