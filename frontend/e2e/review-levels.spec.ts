@@ -141,7 +141,7 @@ test("two runs are compared inside, and statistics count by levels; on a phone, 
   await expect(both.getByRole("listitem")).toHaveCount(2);
   await page.getByRole("button", { name: "All levels" }).click();
   await expect(both.getByRole("listitem")).toHaveCount(6);
-  await expect(both.locator("[data-parting]")).toContainText("CloseFingers_0");
+  await expect(both.locator("[data-parting]")).toContainText("CloseFingers 0");
   expect(await violations(page)).toEqual([]);
   await page.goto(`${product.url}/runs/statistics?graph=${round}`);
   await expect(

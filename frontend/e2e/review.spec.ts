@@ -184,7 +184,7 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
     page.getByRole("list", { name: "Differences" }).getByRole("listitem").first(),
   ).toHaveText(/^1\s*Wait 1 ended with an error/);
   const lanes = page.getByRole("region", { name: "Both runs over time" });
-  await expect(lanes.getByRole("listitem").filter({ hasText: "Wait_1" })).toHaveAttribute(
+  await expect(lanes.getByRole("listitem").filter({ hasText: "Wait 1" })).toHaveAttribute(
     "data-parting",
   );
   await page.getByRole("tab", { name: "Step by step" }).click();

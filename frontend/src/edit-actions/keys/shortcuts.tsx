@@ -17,7 +17,9 @@ export function useSingleKeys() {
   return useKept("aa.single-keys", true);
 }
 
-const FIELDS = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
+/** Beside a value to fill in one goes on typing: its buttons are no place for shortcuts. */
+const FIELDS =
+  "input, textarea, select, [role=dialog], [role=menu], [role=listbox], [data-fill-in] *";
 
 /** Returns true if the focused element uses the keys itself. */
 function isTaken(target: EventTarget | null): boolean {
