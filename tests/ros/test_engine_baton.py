@@ -75,6 +75,9 @@ def test_nothing_begins_after_a_baton_went_until_its_new_holder_lets_it_go_on(
                 ended = [each for each in engines.lines() if each.what == "end"]
                 assert len(ended) == len(found)  # what had begun was not stopped by it
                 await control.rights.take("Ann", BEN, author(BEN), "Carl is away.")
+                held = control.open[run].run.held  # for one more reason
+                assert held is not None
+                assert "Carl may not start on Ann: Ben has its baton" in held.why
                 request = GoOnRequest(since=moment(held.at))
                 await control.go_on(run, request, author(BEN), BEN)
                 assert await over(control, run, 30) == "finished"
