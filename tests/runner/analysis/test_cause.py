@@ -217,6 +217,21 @@ def test_a_halted_graph_names_the_last_end_that_nothing_follows() -> None:
     assert found(FORK, *fork, Ended(6, "halted", "on_halted"))[-1] == sentence
 
 
+def test_a_ready_made_action_is_called_as_people_call_it() -> None:
+    ask = graph("task", *line("A", "AaConfirm"))
+    told = (
+        state(3, "A_0", "RUNNING"),
+        *_ended(4, "A_0", "true"),
+        state(4, "AaConfirm_0", "RUNNING"),
+    )
+    halted = (
+        Observed(5, (*told, *_ended(5, "AaConfirm_0", "false"))),
+        Ended(6, "halted", "on_halted"),
+    )
+    sentence = "Confirm ended false, and nothing follows that: the exit was not reached."
+    assert found(ask, *halted) == [sentence]
+
+
 def _ended(at: int, name: str, result: str) -> tuple[Any, ...]:
     end = "ERROR" if result == "error" else "FINISHED"
     return NodeResult(at, "task", name, f"on_{result}"), state(at, name, end)

@@ -26,6 +26,7 @@ from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.safe_text import sentence
+from action_assistant.umrf.questions import READY_SIGNATURES, title_of
 
 #: The page puts the present name of a person here who had none at that time.
 NOBODY: Final = "Somebody"
@@ -191,4 +192,5 @@ def _beside(found: Mapping[str, LevelPlace], levels: tuple[str, ...]) -> list[st
 def _alone(full_name: str, beside: Iterable[str]) -> str:
     name, _, number = full_name.rpartition("_")
     alike = [each for each in beside if each.rpartition("_")[0] == name]
-    return name if len(alike) < 2 else f"{name} {number}"
+    title = title_of(name) if name in READY_SIGNATURES else name
+    return title if len(alike) < 2 else f"{title} {number}"
