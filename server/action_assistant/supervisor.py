@@ -35,7 +35,9 @@ _PATIENCE: Final = 30.0  # seconds until a start that does not answer is called 
 _STEADY: Final = 30.0  # seconds after which a process counts as healthy again
 _BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th restart in a row
 _TICK: Final = 0.1
-_ENDING: Final = 8.0  # seconds that a process gets to end by itself
+_ENDING: Final = (
+    12.0  # seconds that a process gets to end: its grace, and as long for what it stores then
+)
 _ASKED_EACH: Final = 5.0  # seconds between two questions whether a process answers, at most
 _ASKED_FIRST: Final = 0.2  # seconds between two questions until a start has answered
 _SAID_AFTER: Final = 15.0  # seconds of silence after which it is said, at most
