@@ -5,11 +5,16 @@ import { runnerAt } from "./client";
 import { isOutcomeUnknown, pathRefused } from "./http";
 import { type Run, sightOf, type Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
+import { rememberedPerson } from "./session";
 
 const KEY = "aa.presses";
 const LONGEST = 20_000; // characters of what is kept beyond this page
+const KEPT = 30 * 60_000; // ms; the same press later is another one
 
-function stored(): [string, string][] {
+/** A request id, and the time of its first press, ms. */
+type Pressed = readonly [request: string, at: number];
+
+function stored(): [string, Pressed][] {
   try {
     return Object.entries(JSON.parse(sessionStorage.getItem(KEY) ?? "{}"));
   } catch {
@@ -35,25 +40,27 @@ function keepLostPresses(): void {
 
 /**
  * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
- * thing is sent with the same id, so that the two count once: also after the page was loaded anew, and also one
- * after a press that was refused meanwhile, since the first may still be carried out. Where the id itself is
- * refused, the first was carried out and is over.
+ * thing by the same person is sent with the same id, so that the two count once: also after the page was loaded
+ * anew, and also one after a press that was refused meanwhile, since the first may still be carried out. Where the
+ * id itself is refused, the first was carried out and is over.
  */
 export async function sendPress<T>(
   what: string,
   send: (request: string) => Promise<T>,
 ): Promise<T> {
-  const lost = lostPresses.get(what);
-  const request = lost ?? newAid();
-  lostPresses.set(what, request);
+  const press = `${rememberedPerson()?.id ?? ""} ${what}`;
+  const known = lostPresses.get(press);
+  const lost = known !== undefined && Date.now() - known[1] < KEPT ? known : undefined;
+  const [request, at] = lost ?? [newAid(), Date.now()];
+  lostPresses.set(press, [request, at]);
   keepLostPresses();
   try {
     const answer = await send(request);
-    lostPresses.delete(what);
+    lostPresses.delete(press);
     return answer;
   } catch (error) {
     const isOver = lost === undefined || pathRefused(error).endsWith("/request_id");
-    if (isOver && !isOutcomeUnknown(error)) lostPresses.delete(what);
+    if (isOver && !isOutcomeUnknown(error)) lostPresses.delete(press);
     throw error;
   } finally {
     keepLostPresses();
@@ -109,14 +116,13 @@ export function setRunBreakpoints(
   return runnerAt(runner).put("/api/runs/{run}/breakpoints", { path: { run }, body });
 }
 
-/** Let a led run begin nothing further. What was begun goes on. */
+/**
+ * Let a led run begin nothing further. What was begun goes on. Each press has an id of its own: a second one does
+ * no harm, and one that counted with an earlier one would hold nothing.
+ */
 export function letWait(runner: string, run: string): Promise<Run> {
-  return sendPress(`wait ${run}`, (request) =>
-    runnerAt(runner).post("/api/runs/{run}/wait", {
-      path: { run },
-      body: { request_id: request },
-    }),
-  );
+  const body = { request_id: newAid() };
+  return runnerAt(runner).post("/api/runs/{run}/wait", { path: { run }, body });
 }
 
 /** An outcome by the word of a person. */

@@ -1,5 +1,5 @@
 import { expect, test, vi } from "vitest";
-import { giveOutcome, letGoOn } from "./presses";
+import { giveOutcome, letGoOn, letWait } from "./presses";
 import { abilitiesOf, currentAlarm, type Run } from "./runs";
 
 const alarm = (code: string, second: number) => ({
@@ -54,6 +54,34 @@ test("a press whose answer got lost is sent again with the same request id", asy
   expect(ids[0]).toBe(ids[1]);
   expect(ids[0]).toBeTruthy();
   expect(ids[2]).not.toBe(ids[0]);
+});
+
+test("each Wait has a request id of its own, since one that counted before would hold nothing", async () => {
+  const sent = sentTo([lost, taken()]);
+  await expect(letWait("http://runner", "12")).rejects.toThrow();
+  await letWait("http://runner", "12");
+  expect(new Set(sent.map(({ request_id }) => request_id)).size).toBe(2);
+});
+
+test("a lost press counts with no press of another person, and with none long after it", async () => {
+  vi.useFakeTimers();
+  const person = (id: string) => JSON.stringify({ id, name: id, role: "operator" });
+  let now = person("ann");
+  vi.stubGlobal("localStorage", { getItem: () => now });
+  const sent = sentTo([lost, taken(), taken(), lost, taken()]);
+  const press = () => letGoOn("http://runner", "13", since);
+  await expect(press()).rejects.toThrow();
+  now = person("ben");
+  await press();
+  now = person("ann");
+  await press();
+  await expect(press()).rejects.toThrow();
+  vi.setSystemTime(Date.now() + 31 * 60_000);
+  await press();
+  const ids = sent.map(({ request_id }) => request_id);
+  expect(ids[2]).toBe(ids[0]);
+  expect(new Set(ids).size).toBe(4);
+  vi.useRealTimers();
 });
 
 test("a press that was refused, and one of another thing, has a request id of its own", async () => {
