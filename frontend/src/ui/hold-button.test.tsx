@@ -31,18 +31,23 @@ function button(): HTMLButtonElement {
 
 beforeAll(() => HoldQuestion.preload());
 
+function show(disabled: boolean): void {
+  const props = { label: "Start", name: "Start v1", question: "Sure?", disabled, onHeld };
+  act(() =>
+    root.render(
+      <MantineProvider>
+        <HoldButton {...props} />
+      </MantineProvider>,
+    ),
+  );
+}
+
 beforeEach(() => {
   vi.useFakeTimers();
   onHeld.mockReset();
   const place = document.body.appendChild(document.createElement("div"));
   root = createRoot(place);
-  act(() =>
-    root.render(
-      <MantineProvider>
-        <HoldButton label="Start" name="Start v1" question="Sure?" onHeld={onHeld} />
-      </MantineProvider>,
-    ),
-  );
+  show(false);
 });
 
 afterEach(() => {
@@ -55,6 +60,16 @@ const fire = (event: Event) => act(() => void button().dispatchEvent(event));
 const wait = (ms: number) => act(() => vi.advanceTimersByTime(ms));
 const pointer = (type: string) => new MouseEvent(type, { bubbles: true, button: 0 });
 const key = (type: string) => new KeyboardEvent(type, { key: "Enter", bubbles: true });
+
+test("a button that is disabled while it is held starts nothing, also if it is enabled again", () => {
+  fire(pointer("pointerdown"));
+  wait(300);
+  show(true);
+  wait(100);
+  show(false);
+  wait(2_000);
+  expect(onHeld).not.toHaveBeenCalled();
+});
 
 test("a tap starts nothing", () => {
   fire(pointer("pointerdown"));

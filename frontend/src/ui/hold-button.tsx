@@ -29,6 +29,11 @@ export function HoldButton({ label, name, question, disabled = false, size, icon
   const [asking, setAsking] = useState<boolean | null>(null);
   const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
   useEffect(() => () => clearTimeout(timer.current), []);
+  useEffect(() => {
+    if (!disabled) return;
+    clearTimeout(timer.current);
+    setHolding(false);
+  }, [disabled]);
 
   const begin = () => {
     if (disabled || holding) return;
