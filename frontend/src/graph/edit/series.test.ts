@@ -137,7 +137,22 @@ test("a series that would not go on or lose a value is refused, with the reason"
         addParameter(doc, drive, "out", "place", '{"pvf_type": "string"}');
         return [drive];
       },
-      "get this value from the one before",
+      "get place from the one before",
+    ],
+    [
+      (doc, drive) => {
+        addParameter(doc, drive, "out", "speed", '{"pvf_type": "number"}');
+        return [drive];
+      },
+      "get speed from the one before",
+    ],
+    [
+      (doc, drive) => {
+        const watch = addAction(doc, { name: "Watch" });
+        connect(doc, watch, drive, "on_true", "stop");
+        return [drive];
+      },
+      "Watch stops or pauses it",
     ],
   ];
   for (const [make, words] of cases) {
@@ -177,12 +192,15 @@ test("the series that tests/umrf/test_drawn_graphs.py plays are those that are d
     const { actions, relations } = graphIn(doc);
     const keys = [actions[one % actions.length]?.key as Key];
     while (keys.length <= more) {
-      const next = relations.find(
-        ({ parent, child, conditions }) =>
-          parent === keys.at(-1) && conditions.on_true === "run" && !keys.includes(child),
+      const following = relations.filter(
+        ({ parent, conditions }) => parent === keys.at(-1) && conditions.on_true === "run",
       );
-      if (!next || next.child === "exit") break;
-      keys.push(next.child);
+      // The keys are drawn by lot, so their order says nothing.
+      const next = actions.find(
+        ({ key }) => !keys.includes(key) && following.some(({ child }) => child === key),
+      );
+      if (!next) break;
+      keys.push(next.key);
     }
     const values = Array.from({ length: count }, (_, i) => `R${i}`);
     const isDrawn = !goesInCircles(arrowsOf(doc)) && copied(doc, keys, ROBOT, values) !== null;

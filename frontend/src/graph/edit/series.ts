@@ -74,6 +74,11 @@ interface Piece {
 const runs = (relation: Relation): boolean =>
   Object.values(relation.conditions).some((response) => response === "run");
 
+const INTERRUPTS: ReadonlySet<string> = new Set(["stop", "pause", "restart"]);
+
+const interrupts = (relation: Relation): boolean =>
+  Object.values(relation.conditions).some((response) => INTERRUPTS.has(response));
+
 /** Returns the beginning and the end of these actions, or why their copies cannot be a series. */
 function pieceOf(graph: Graph, keys: ReadonlySet<Key>, varied: Varied): Piece | string {
   const inside = graph.relations.filter(({ parent, child }) => keys.has(parent) && keys.has(child));
@@ -89,16 +94,24 @@ function pieceOf(graph: Graph, keys: ReadonlySet<Key>, varied: Varied): Piece | 
     ({ parent, child }) => !keys.has(parent) && keys.has(child) && child !== first,
   );
   if (into) return `An arrow from elsewhere leads to ${isolated(nameOf(graph, into.child))}.`;
+  const meddles = graph.relations.find(
+    (relation) => relation.child === first && !keys.has(relation.parent) && interrupts(relation),
+  );
+  if (meddles) {
+    return `${isolated(nameOf(graph, meddles.parent))} stops or pauses it, and would reach the first only.`;
+  }
   const given = [...(dataFlowOf(graph).get(first) ?? [])].find(([, givers]) =>
     givers.some(({ parent }) => !keys.has(parent)),
   );
   if (given && !(varied.kind === "input" && varied.path === given[0])) {
     return `${isolated(pathWords(given[0]))} comes from another action, which gives it to the first only.`;
   }
-  const outputs = graph.actions.find(({ key }) => key === last)?.outputs ?? [];
-  const replaced =
-    varied.kind === "input" && outputs.some(({ path }) => flatName(path) === flatName(varied.path));
-  if (replaced) return "Each copy would get this value from the one before it.";
+  const actions = new Map(graph.actions.map((action) => [action.key, action]));
+  const outputs = new Set(actions.get(last)?.outputs.map(({ path }) => flatName(path)));
+  const replaced = actions.get(first)?.inputs.find(({ path }) => outputs.has(flatName(path)));
+  if (replaced) {
+    return `Each copy would get ${isolated(pathWords(replaced.path))} from the one before it.`;
+  }
   return { first, last };
 }
 
