@@ -94,15 +94,18 @@ test("of a run that is over each robot has the end of its own last action", () =
     Grip_0: action("g", "FINISHED", [visit(0, 1, "false")]),
     Hold_0: action("h", "UNINITIALIZED"),
     Wave_0: action("w", "RUNNING", [visit(1, null)]),
+    Skip_0: action("s", "BYPASSED"),
   };
-  const of = { Drive: "atlas", Look: "atlas", Grip: "birch", Hold: "cedar", Wave: "people" };
+  const first = { Drive: "atlas", Look: "atlas", Grip: "birch", Hold: "cedar" };
+  const of = { ...first, Wave: "people", Skip: "elm" };
   const lanes = Object.entries(of).map(([name, robot]) => lane(`${name}_0`, robot));
-  const over = run({ actions, state: "lost", ended_at: iso(3) });
+  const over = run({ actions, state: "error", result: "on_error", ended_at: iso(3) });
   expect(robotTabs([over], lanes, false).map(({ words }) => words)).toEqual([
     "stopped",
     "false",
     "did not run",
-    "lost",
+    "end not seen",
+    "passed over",
   ]);
 });
 

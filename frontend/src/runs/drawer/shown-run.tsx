@@ -252,7 +252,11 @@ function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
   if (names !== null && run.state === "running") return { tone: "idle", words: "waits" } as const;
   if (names === null || run.ended_at === null) return { tone, words: word };
   const last = lastVisit(own.map(([, action]) => action));
-  if (last === null) return { tone: "idle", words: "did not run" } as const;
+  if (last === null) {
+    const isPassed = own.some(([, { state }]) => state === "BYPASSED");
+    return { tone: "idle", words: isPassed ? "passed over" : "did not run" } as const;
+  }
+  if (visitEnd(last) === null) return { tone: "unknown", words: "end not seen" } as const;
   const ended = resultTone[last.result ?? ""];
   return ended === undefined ? { tone, words: word } : { tone: ended, words: ended };
 }
