@@ -79,19 +79,10 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   await expect(waits(page)).toBeHidden();
 });
 
-test("a run asks people, on every page, and their first answer is its outcome", async () => {
-  const { page } = ada;
-  const text = (value: string) => ({ pvf_type: "string", pvf_value: value });
-  const asking = [
-    ["AaConfirm", { question: text("Is the door open?") }],
-    [
-      "AaChoose",
-      {
-        question: text("Which shelf?"),
-        choices: { pvf_type: "strings", pvf_value: ["left", "right"] },
-      },
-    ],
-  ] as const;
+const text = (value: string) => ({ pvf_type: "string", pvf_value: value });
+
+/** Opens a new graph of ready-made actions, one after the other, and starts it in the simulator. */
+async function asks(page: Page, asking: readonly (readonly [string, object])[]): Promise<void> {
   const names = asking.map(([name]) => ({ name, instance_id: 0 }));
   const actions = asking.map(([name, input_parameters], i) => ({
     ...{ name, instance_id: 0, type: "sync", input_parameters },
@@ -100,33 +91,67 @@ test("a run asks people, on every page, and their first answer is its outcome", 
   const ends = { graph_entry: names.slice(0, 1), graph_exit: names.slice(-1) };
   const body = JSON.stringify({ graph_name: "asking", ...ends, actions });
   const headers = { "content-type": "application/json" };
-  const { id } = await product.ask<{ id: string }>("/api/graphs", {
-    method: "POST",
-    body,
-    headers,
-  });
-  await page.goto(`${product.url}/graphs/${id}`);
+  const made = await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers });
+  await page.goto(`${product.url}/graphs/${made.id}`);
   await saved(page);
   await page.getByRole("button", { name: /^Run v\d+ in the simulator …/ }).click();
   await dialog(page)
     .getByRole("button", { name: /^Run v\d+, step by step, in/ })
     .click();
+}
+
+test("a phone answers with a photo of 8 MB, and not with a larger one", async () => {
+  const { page } = ada;
+  await asks(page, [["AaAskPhoto", { question: text("How does the gripper look?") }]]);
+  await page.setViewportSize({ width: 390, height: 844 });
+  await page.getByRole("link", { name: /asks: .*How does the gripper look/ }).click();
+  const asked = page.getByRole("region", { name: /^Question of/ });
+  const take = asked.getByRole("button", { name: "Take or choose a photo" });
+  const most = 8 * 1024 * 1024;
+  const picture = (size: number) => {
+    const buffer = Buffer.alloc(size, 7);
+    Buffer.from([0xff, 0xd8, 0xff, 0xe0]).copy(buffer);
+    return { name: "gripper.jpg", mimeType: "image/jpeg", buffer };
+  };
+  const choosing = async (size: number) => {
+    const chooser = page.waitForEvent("filechooser");
+    await take.click();
+    await (await chooser).setFiles(picture(size));
+  };
+  await choosing(most + 1);
+  await expect(asked.getByRole("alert")).toContainText(/8|large/, { timeout: 15_000 });
+  expect((await runs())[0]?.state).toBe("running");
+  await choosing(most);
+  await expect.poll(async () => (await runs())[0]?.state, { timeout: 30_000 }).toBe("finished");
+  await page.setViewportSize({ width: 1440, height: 900 });
+  const link = page.getByRole("list", { name: "Answered" }).getByRole("link", { name: "photo" });
+  const photo = await page.request.get((await link.getAttribute("href")) ?? "");
+  expect((await photo.body()).length).toBe(most);
+});
+
+test("a run asks people, on every page, and their first answer is its outcome", async () => {
+  const { page } = ada;
+  const choices = { pvf_type: "strings", pvf_value: ["left", "right"] };
+  await asks(page, [
+    ["AaConfirm", { question: text("Is the door open?") }],
+    ["AaChoose", { question: text("Which shelf?"), choices }],
+  ]);
   const asked = page.getByRole("region", { name: /^Question of/ });
   await expect(asked).toContainText("Is the door open?", { timeout: 15_000 });
 
   // Whoever is asked sees it on the phone, on another page, and answers there.
   await page.setViewportSize({ width: 360, height: 740 });
-  const asks = page.getByRole("link", { name: /asks: .*Is the door open/ });
+  const chip = page.getByRole("link", { name: /asks: .*Is the door open/ });
   const isRead = async () => {
-    await expect(asks).toBeInViewport({ ratio: 1 });
-    expect((await asks.boundingBox())?.width).toBeGreaterThan(340);
+    await expect(chip).toBeInViewport({ ratio: 1 });
+    expect((await chip.boundingBox())?.width).toBeGreaterThan(340);
   };
   await isRead();
   await page.goto(product.url);
   await isRead();
   await expect(page.getByRole("link", { name: "Runs", exact: true })).toBeInViewport();
-  await asks.click();
-  await expect(asks).toBeHidden();
+  await chip.click();
+  await expect(chip).toBeHidden();
   await asked.getByRole("button", { name: "Yes" }).click();
   await expect(asked).toContainText("Which shelf?");
   await asked.getByRole("button", { name: "right" }).click();
