@@ -113,7 +113,8 @@ async def test_of_two_steps_at_once_one_counts_and_the_other_person_is_told() ->
         async with anyio.create_task_group() as presses:
             presses.start_soon(press, ANN)
             presses.start_soon(press, BEN)
-        assert refused == ["The run has gone on, or was stopped, meanwhile."]
+        (why,) = refused
+        assert why.startswith("The run has gone on, was stopped, or has another reason to wait")
         await anyio.sleep(30)
         assert len(lab.carol.starts) == 1
         assert len(lab.david.starts) == 1

@@ -84,7 +84,7 @@ def processes() -> list[psutil.Process]:
     for each in psutil.process_iter():
         with suppress(psutil.Error):
             ours = str(Path(call_program.__file__)) in each.cmdline()
-            if ours and each.environ()["PATH"].endswith(_OURS):
+            if ours and each.environ().get("PATH", "").endswith(_OURS):
                 found.append(each)
     return found
 
