@@ -4,7 +4,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from msgspec.structs import replace
 
 from action_assistant.umrf.courses.together import together
-from action_assistant.umrf.model import PRECONDITIONS, Conditions, Graph
+from action_assistant.umrf.model import PRECONDITIONS, Conditions, Graph, Parameter
 from action_assistant.umrf.semantics import NodeResultEvent, NodeStateEvent, simulate
 from support.doses import examples
 from umrf.checks.test_overlaps import CALLS, Calls, scripted
@@ -61,6 +61,21 @@ def test_two_ways_to_one_action_that_exclude_each_other_let_it_run_once() -> Non
     graph = optional(graph, "A>H", "B>H", "B>exit", "H>exit")
     assert again(graph) == set()
     assert beside(graph) == set()
+
+
+def test_a_course_goes_on_past_an_exit_that_waits_for_an_output() -> None:
+    ends = Conditions("run", "ignore", "run", "ignore")
+    graph = graph_of(
+        *("entry>Look", "Look>Go", "Look>exit", "Go>Lift", "Go>Wave", "Wave>Look", "Lift>exit"),
+        LookGo=TRUE, Lookexit=ends, GoLift=TRUE, GoWave=TRUE, WaveLook=FALSE, Liftexit=TRUE,
+    )  # fmt: skip
+    graph = optional(graph, "Look>exit", "Lift>exit", "Wave>Look")
+    assert beside(graph) == set(), "it ends when Look has ended"
+    text = Parameter(path="p", text='{"pvf_type":"string"}')
+    lifts = (replace(a, outputs=(text,)) if a.name == "Lift" else a for a in graph.actions)
+    graph = replace(graph, actions=tuple(lifts))  # the exit takes that, and Look has none
+    assert frozenset({"Lift", "Wave"}) in beside(graph)
+    assert again(graph) >= {"Look", "Go"}
 
 
 def test_nothing_is_said_of_a_graph_that_stops_an_action_or_has_too_many_courses() -> None:

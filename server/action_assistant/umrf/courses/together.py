@@ -1,8 +1,9 @@
 """Follows every course of a small graph, to find which actions run at the same time, and which run again.
 
-The rules are those of `courses.instants`. Every action may end with each outcome, in any order, and no action
-waits for a value: so what is found can only be too much. Combinations of outcomes exclude each other here, as
-that of a loop which goes on and that which leads out of it; arrows alone do not show that.
+The rules are those of `courses.instants`. Every action may end with each outcome, in any order, no action waits
+for a value, and no course ends at an exit that does: so what is found can only be too much. Combinations of
+outcomes exclude each other here, as that of a loop which goes on and that which leads out of it; arrows alone do
+not show that.
 """
 
 from collections import Counter
@@ -14,7 +15,8 @@ from msgspec.structs import replace
 from action_assistant.umrf.components import Mask, nodes_in
 from action_assistant.umrf.courses.instants import Instant, State
 from action_assistant.umrf.courses.network import Network
-from action_assistant.umrf.model import OUTCOMES, PRECONDITIONS, Graph, Key
+from action_assistant.umrf.model import EXIT, OUTCOMES, PRECONDITIONS, Graph, Key
+from action_assistant.umrf.semantics.parts import exit_inputs
 from action_assistant.umrf.semantics.transitions import RUNS
 
 #: The most states of single actions that are examined: some 50 ms.
@@ -60,8 +62,15 @@ def together(graph: Graph, budget: int = BUDGET) -> Together | None:
 
 
 def _without_values(graph: Graph) -> Graph:
+    """Return a graph with all courses of this one, in which nothing waits for a value. An exit that
+    takes outputs may wait for them, and the graph goes on meanwhile: it has no arrows there."""
+    waits = bool(exit_inputs(graph))
     actions = tuple(replace(action, inputs=(), outputs=()) for action in graph.actions)
-    relations = tuple(replace(relation, remap=()) for relation in graph.relations)
+    relations = tuple(
+        replace(relation, remap=())
+        for relation in graph.relations
+        if relation.child != EXIT or not waits
+    )
     return replace(graph, actions=actions, relations=relations)
 
 
