@@ -48,7 +48,8 @@ export function noticesOf({ runs, engines, queue }: Live, inbox: Inbox | undefin
       const text = `The Stop of r${words} is unconfirmed: ${names} may still be moving. ${isolated(alarm.text)}`;
       found.push({ key: `run.stop_unconfirmed:${run.id}`, text, path });
     }
-    if (run.held && run.held.by === null && run.ended_at === null) {
+    const held = run.held && (run.held.by === null || run.held.how === "trouble");
+    if (run.held && held && run.ended_at === null) {
       const text = `R${words} waits for a person, who lets it go on or stops it. ${isolated(run.held.why)}`;
       found.push({ key: `run.held:${run.id}:${run.held.since}`, text, path });
     }

@@ -170,6 +170,27 @@ async def test_a_resume_that_waits_for_its_turn_does_not_leave_after_a_stop() ->
         assert not david.resumed
 
 
+@virtual
+async def test_a_resume_that_was_kept_back_can_be_made_again() -> None:
+    david = SlowToGoOn(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        await control.pause(run, ANN)
+        still = control.rights.require_still
+
+        def gone(*_: object) -> None:
+            raise NotSent("The baton of David has changed hands.")
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(control.rights, "require_still", gone)
+            with pytest.raises(Unavailable, match="changed hands"):
+                await control.resume(run, ANN)
+        assert control.rights.require_still == still
+        await control.resume(run, BEN)
+        assert david.resumed
+
+
 def test_a_pause_that_cannot_be_sent_is_told_and_the_run_is_stopped_all_the_same() -> None:
     class Unsendable(Open):
         pauses = True

@@ -25,6 +25,7 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import microseconds, time
 from action_assistant.runner.start.admission import GoOnRequest, WaitRequest, WordRequest
+from action_assistant.umrf.breakpoints import Breakpoint
 from runner.execution.test_conductor import Lab, led, shared
 from runner.harness import (
     ANN,
@@ -34,6 +35,7 @@ from runner.harness import (
     ended,
     engine,
     run_in_virtual_time,
+    sequence,
     stand_still,
     until,
     virtual,
@@ -47,6 +49,13 @@ def hold(control: ExecutionService, run: str) -> datetime:
     held = control.open[run].run.held
     assert held is not None
     return time(held.at)
+
+
+def now_held(control: ExecutionService, run: str) -> Held:
+    """Return why a led run is held now."""
+    held = control.open[run].run.held
+    assert held is not None
+    return held
 
 
 def released(lab: Lab, run: str) -> list[Released]:
@@ -205,6 +214,68 @@ async def test_a_runner_that_stands_still_while_go_on_asks_the_robots_lets_nothi
         assert "stood still" in held.why
         await anyio.sleep(30)
         assert lab.carol.starts == []
+
+
+@virtual
+async def test_a_second_wait_with_the_same_words_counts_as_well() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        await control.wait(run, WaitRequest(request_id="first"), ANN)
+        first = control.open[run].run.held
+        assert first is not None
+        lab.david.old = 1.5
+        refusals: list[str] = []
+
+        async def press() -> None:
+            try:
+                await control.go_on(run, GoOnRequest(time(first.at), request_id="go"), BEN)
+            except Conflict as why:
+                refusals.append(why.detail)
+
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(press)
+            await anyio.sleep(0.05)
+            await control.wait(run, WaitRequest(request_id="second"), ANN)
+        held = control.open[run].run.held
+        assert held is not None, "Ann was answered that it waits"
+        assert held.why == first.why
+        assert len(refusals) == 1
+        assert {"first", "second"} <= control.open[run].run.pressed.keys()
+        await anyio.sleep(10)
+        assert lab.carol.starts == []
+
+
+@virtual
+async def test_a_fault_behind_a_wait_is_nobodys_press() -> None:
+    lab = Lab({"*": [{"after_s": 50}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        hold(control, run)
+        await control.wait(run, WaitRequest(request_id="wait"), ANN)
+        stand_still(6)
+        await anyio.sleep(3)
+        told = [each for each in lab.harness.journal.told(run) if isinstance(each, Held)]
+        assert [each.by for each in told] == [None, ANN, None]
+        assert {each.how for each in told} == {"trouble"}
+        assert "made it wait. The runner stood still" in told[-1].why
+
+
+@virtual
+async def test_a_breakpoint_that_is_reached_during_trouble_is_seen_with_it() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 3), "Scout", "Carrier")
+        point = Breakpoint(action="Work_0", outcomes=("true",))
+        started = await control.start(led(graph, lost="wait", breakpoints=(point,)), ANN)
+        run = started.run.id
+        await until(lambda: bool(lab.david.starts))
+        hold(control, run)
+        await until(lambda: "Breakpoint" in (now_held(control, run).why))
+        held = now_held(control, run)
+        assert held.why.startswith("A robot was lost. Breakpoint after Work_0")
+        await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert control.open[run].run.held is None
 
 
 @virtual

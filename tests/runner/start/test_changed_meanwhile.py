@@ -119,6 +119,9 @@ async def test_a_run_that_another_process_has_is_stopped_again_and_again_and_nev
         await anyio.sleep(5)
         assert not await david.moving("patrol")
         assert only_run(control).end is None, "nobody knows what the first process does"
+        sent = len(david.stops)
+        await anyio.sleep(120)
+        assert len(david.stops) - sent <= 1, "nothing of it moves there any more"
 
 
 @virtual

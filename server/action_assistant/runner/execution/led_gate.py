@@ -90,7 +90,6 @@ class LedGate(Gate):
         for number, node in first.before.calls.items() if first.before is not None else ():
             self._calls.setdefault(node, set()).add(number)
         self._reached: set[tuple[str, int]] = set()  # breakpoints before calls that were reached
-        self._due: list[str] = []  # breakpoints that were reached during trouble
         #: Called in the step in which the run is held.
         self.on_hold: Callable[[], None] = _ignore
         #: Returns why a person whose page is missing may not let the run go on, by robot; "" if they may.
@@ -117,13 +116,14 @@ class LedGate(Gate):
     def _hold(self, held: Held, author: str = "") -> None:
         known = self.held
         self._reasons = self._reasons if known is not None else set()
-        if self.is_final or held.why in self._reasons:
+        is_told = held.why in self._reasons
+        # Each press of a person counts, also one with the same words: nothing goes on past it.
+        if self.is_final or (is_told and held.by is None):
             return
         self._reasons.add(held.why)
         if known is not None and _RANK[known.how] >= _RANK[held.how]:
-            why = f"{known.why[:_LONGEST_WHY]} {held.why}"
-            by = held.by or known.by
-            held = replace(held, how=known.how, why=why, by=by, node=known.node)
+            why = known.why if is_told else f"{known.why[:_LONGEST_WHY]} {held.why}"
+            held = replace(held, how=known.how, why=why, node=known.node)
         self.hold(held)
         self.on_hold()
         self._let, self._let_by, self._limit = None, None, UNLIMITED
@@ -208,10 +208,7 @@ class LedGate(Gate):
         for each in self.breakpoints:
             is_here = each.is_at_end and each.action == step.node and told in each.outcomes
             if is_here and each.holds(self.visit(step.call), outputs):
-                why = f"Breakpoint {each.words()}."
-                if self.held is not None and self.held.how == "trouble":
-                    self._due.append(why)
-                self.hold_run(why, how="breakpoint", node=step.node)
+                self.hold_run(f"Breakpoint {each.words()}.", how="breakpoint", node=step.node)
 
     def set_breakpoints(self, author: Author, breakpoints: tuple[Breakpoint, ...]) -> None:
         """Let the run wait at these breakpoints from now on, and record that. A run that already
@@ -330,9 +327,6 @@ class LedGate(Gate):
         )
         self._tell(released, press.author.id)
         self.release()
-        due, self._due = self._due, []
-        for why in due:  # reached during trouble, and not seen by anybody
-            self.hold_run(why, how="breakpoint")
 
 
 def _ignore() -> None:

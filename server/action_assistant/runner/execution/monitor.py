@@ -276,7 +276,8 @@ class Monitor:
         name = run.graph_name
         own = next((each for each in answer.graphs if each.graph == name), None)
         is_other = len({run.incarnation, answer.incarnation} - {None, ""}) > 1
-        self.is_elsewhere = is_other and own is not None and own.run == run.id
+        moves = own is not None and (own.state not in TERMINAL or _any_active(answer, name))
+        self.is_elsewhere = is_other and own is not None and own.run == run.id and moves
         if is_other:
             self._lose_engine(changes)
             return
@@ -567,6 +568,15 @@ class Monitor:
         if stalls and self._stalled_as is not run.actions:
             self._stalled_as = run.actions
             self._jobs.append(partial(self._report_stall, changes.run))
+
+
+def _any_active(answer: Answer, name: str) -> bool:
+    """Return whether an answer shows an active action of the graph with this name, or of a sub-graph of
+    it."""
+    own = (
+        each for each in answer.graphs if each.graph == name or each.graph.startswith(f"{name}__")
+    )
+    return any(each.active for each in own)
 
 
 def _has_begun(run: Run) -> bool:

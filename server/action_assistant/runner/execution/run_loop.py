@@ -179,11 +179,17 @@ class OpenRun:
     async def resume(
         self, author: Author, watching: tuple[str, ...] = (), may_leave: Leaves = unwatched
     ) -> None:
-        """Record that `author` wants the run to go on, and send that to the engine. `watching`: the
-        robots that they watch; `may_leave`: raises NotSent if the message may not leave any more. Do
-        not wait for its effect. Raise NotSent if the message could not be sent."""
-        self.tell(ResumeRequested(self._clock_us(), author, watching), author.id)
-        await self._link.resume(self.run.graph_name, leaves=self._unless_stopped(may_leave))
+        """Send the engine that the run goes on, and record in the moment in which that leaves that
+        `author` wants it. `watching`: the robots that they watch; `may_leave`: raises NotSent if the
+        message may not leave any more. Do not wait for its effect. Raise NotSent if the message could
+        not be sent."""
+        check = self._unless_stopped(may_leave)
+
+        def leave() -> None:
+            check()
+            self.tell(ResumeRequested(self._clock_us(), author, watching), author.id)
+
+        await self._link.resume(self.run.graph_name, leaves=leave)
         self.look()
 
     async def modify(

@@ -219,6 +219,7 @@ class SimulatedLink:
         """Replace a running graph by the one in `order` now. `continue_from`: the full name of an
         action that is started then, "" for none. Raise NotSent if the process cannot take the
         change, EngineRefused if the engine refuses it."""
+        leaves()
         await self._request("modify", order, continue_from)
 
     async def get(self) -> Answer:
