@@ -33,33 +33,41 @@ async def store(
     author: str,
     compute: Callable[[bytes, int], Awaitable[T]],
     update_of: Callable[[T], bytes],
+    *,
+    insists: bool = False,
 ) -> StoredEdit[T]:
     """Store an edit of the server that depends on what the document holds, in the name of `author`.
     `compute` is given the document (encoded) and the number of its last change; `update_of` returns
     the update of what it returns. If people change the document meanwhile, it is computed again: an
-    update made without their edits could remove or replace what they have set. Raise what `compute`
-    raises; Overtaken, when nothing is stored, if people were faster a few times; BadInput or
-    TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable if the room is
-    closed or the edit cannot be stored."""
-    for _ in range(_TRIES):
+    update made without their edits could remove or replace what they have set. Where it cannot, since it
+    sets values of its own only (`insists`), it is stored at the last try whatever they have changed.
+    Raise what `compute` raises; Overtaken, when nothing is stored, if people were faster a few times;
+    BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable if the
+    room is closed or the edit cannot be stored."""
+    for tries_left in reversed(range(_TRIES)):
         state, before = await room.read(lambda replica, seq: (replica.state(), seq))
         computed = await compute(state, before)
         try:
-            seq = await room.submit(update_of(computed), author, expected=before)
+            expected = before if tries_left or not insists else None
+            seq = await room.submit(update_of(computed), author, expected=expected)
         except Overtaken:
             continue
         return StoredEdit(computed, before, seq)
     raise Overtaken(
-        f"Others have changed this {_TRIES} times while the edit was worked out. Nothing of it was "
-        "written; try again."
+        f"Others have changed this {_TRIES} times while the edit was worked out, so it was not made "
+        "here; try again."
     )
 
 
 async def store_update(
-    room: Room, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
+    room: Room,
+    author: str,
+    compute: Callable[[bytes, int], Awaitable[bytes]],
+    *,
+    insists: bool = False,
 ) -> StoredEdit[bytes]:
     """Do what `store` does, with the update that `compute` returns."""
-    return await store(room, author, compute, lambda update: update)
+    return await store(room, author, compute, lambda update: update, insists=insists)
 
 
 async def rename(
@@ -75,7 +83,10 @@ async def rename(
     of `author`; None keeps the old one. Return the number (seq) of this edit, or of the last change
     if it changed nothing. Raise the errors of `store`."""
     edit = await store_update(
-        room, author, lambda state, _: run_in_worker(renaming, state, name, description, kind)
+        room,
+        author,
+        lambda state, _: run_in_worker(renaming, state, name, description, kind),
+        insists=True,
     )
     return edit.seq
 
