@@ -1,4 +1,5 @@
 /** What people send to runs: presses that let led runs go on, each of which counts once, and another version. */
+import { deviceNow } from "../clock/server-clock";
 import type { RunBreakpoint } from "../graph/breakpoints";
 import { newAid } from "../graph/document-keys";
 import { runnerAt } from "./client";
@@ -50,8 +51,8 @@ export async function sendPress<T>(
 ): Promise<T> {
   const press = `${rememberedPerson()?.id ?? ""} ${what}`;
   const known = lostPresses.get(press);
-  const lost = known !== undefined && Date.now() - known[1] < KEPT ? known : undefined;
-  const [request, at] = lost ?? [newAid(), Date.now()];
+  const lost = known !== undefined && deviceNow() - known[1] < KEPT ? known : undefined;
+  const [request, at] = lost ?? [newAid(), deviceNow()];
   lostPresses.set(press, [request, at]);
   keepLostPresses();
   try {
