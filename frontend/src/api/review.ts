@@ -11,8 +11,6 @@ export type RunMarks = RunnerApi["RunMarks"];
 export type ListedRun = RunnerApi["Listed"];
 /** Proven cause of the end of a run, with the place that shows it. */
 export type Cause = RunnerApi["CauseShown"];
-/** A note that somebody wrote for a moment of a run. */
-export type RunNote = RunnerApi["RunNote"];
 export type ComparedField = RunnerApi["Field"];
 export type ComparedStep = RunnerApi["ComparedVisit"];
 export type Comparison = RunnerApi["RunComparison"];
@@ -124,28 +122,6 @@ export function useMarks(runner: string | undefined, run: string) {
 export function setMarks(runner: string, run: string, marks: Partial<RunMarks>): Promise<RunMarks> {
   const request = { path: { run }, body: marks, keepalive: true };
   return runnerAt(runner).patch("/api/runs/{run}/marks", request);
-}
-
-export function useRunNotes(runner: string | undefined, run: string) {
-  return useQuery({
-    queryKey: notesKey(run),
-    queryFn: ({ signal }) =>
-      runnerAt(runner).get("/api/runs/{run}/notes", { path: { run }, signal }),
-    enabled: runner !== undefined,
-  });
-}
-
-/** The key of the query for the notes of a run. */
-export const notesKey = (run: string) => ["runs", "notes", run] as const;
-
-/** Adds a note for a moment, and returns all notes of the run. `moment`: null for its end, or now. */
-export function addRunNote(
-  runner: string,
-  run: string,
-  note: { readonly text: string; readonly moment: string | null },
-): Promise<RunNote[]> {
-  const request = { path: { run }, body: note, keepalive: true };
-  return runnerAt(runner).post("/api/runs/{run}/notes", request);
 }
 
 export function useLabels(runner: string | undefined) {

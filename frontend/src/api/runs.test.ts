@@ -1,5 +1,6 @@
 import { expect, test, vi } from "vitest";
 import { giveOutcome, letGoOn, letWait } from "./presses";
+import { addRunNote } from "./run-notes";
 import { abilitiesOf, currentAlarm, type Run } from "./runs";
 
 const alarm = (code: string, second: number) => ({
@@ -93,4 +94,17 @@ test("a press that was refused, and one of another thing, has a request id of it
   await expect(giveOutcome("http://runner", "12", word)).rejects.toThrow();
   await expect(giveOutcome("http://runner", "12", { ...word, outcome: "false" })).rejects.toThrow();
   expect(new Set(sent.map(({ request_id }) => request_id)).size).toBe(5);
+});
+
+test("a note whose answer got lost is the same note when it is sent again, at a later moment too", async () => {
+  const sent = sentTo([lost, taken(), taken()]);
+  const note = (moment: string | null) =>
+    addRunNote("http://runner", "12", { text: "odd", moment });
+  await expect(note(since)).rejects.toThrow();
+  await note("2026-01-01T00:00:09Z");
+  await note(null);
+  const ids = sent.map(({ request_id }) => request_id);
+  expect(ids[0]).toBeTruthy();
+  expect(ids[1]).toBe(ids[0]);
+  expect(ids[2]).not.toBe(ids[0]);
 });

@@ -4,12 +4,13 @@ import { useQueryClient } from "@tanstack/react-query";
 import { useRef, useState } from "react";
 import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
-import { addRunNote, notesKey, type RunNote } from "../api/review";
+import { usePerson } from "../api/people";
+import { addRunNote, notesKey, type RunNote } from "../api/run-notes";
 import type { Run } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import type { TimeSign } from "../status/lanes/timeline";
 import { announcer } from "../ui/announcer";
-import { useKeptText } from "../ui/kept-texts";
+import { textScope, useKeptText } from "../ui/kept-texts";
 import { keyOf } from "../ui/keys";
 import { instant, stopwatch } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -67,7 +68,8 @@ interface FormProps {
 
 function NoteForm({ runner, run, moment, onClose }: FormProps) {
   const client = useQueryClient();
-  const [text, setText] = useKeptText(`run/${run.id}/note`);
+  const { person } = usePerson();
+  const [text, setText] = useKeptText(`${textScope(`run ${run.id}`, person.id)}note`);
   const [wrong, setWrong] = useState("");
   const [busy, setBusy] = useState(false);
   const save = async () => {

@@ -51,6 +51,28 @@ def test_notes_stand_at_their_moments_with_their_author_in_search_and_export(
         assert client.get(f"/api/runs/{run['id']}").json()["ended_at"] == run["ended_at"]
 
 
+def test_a_note_that_is_sent_again_with_its_request_id_is_stored_once(
+    own_process: RunnerProcess,
+) -> None:
+    def send(client: httpx.Client, text: str, request: str) -> httpx.Response:
+        return client.post(path, json={"text": text, "request_id": request})
+
+    with own_process.client() as client:
+        path = f"/api/runs/{ran(client)['id']}/notes"
+        noted = send(client, "it squeaked", "one").json()
+        assert send(client, " it squeaked", "one").json() == noted
+        refused = send(client, "it did not squeak", "one")
+        assert (refused.status_code, refused.json()["where"]) == (409, {"path": "/request_id"})
+        assert send(client, "x", "x" * 201).status_code == 400
+    own_process.kill()
+    own_process.start()
+    with own_process.client() as client:
+        assert send(client, "it squeaked", "one").json() == noted
+        assert len(send(client, "it squeaked", "two").json()) == 2
+        assert len(send(client, "it squeaked", "").json()) == 3
+        assert len(send(client, "it squeaked", "").json()) == 4
+
+
 def test_a_note_outside_of_the_run_or_without_a_text_is_refused_with_its_place(
     process: RunnerProcess,
 ) -> None:

@@ -1604,11 +1604,14 @@ export interface RunnerApi {
     /**
      * NoteText
      * @description A note for a moment of a run. `moment`: without it, now; for a run that is over, its end.
+     *     `request_id`: names this request; a repeat by the same person adds no second note.
      */
     NoteText: {
         text: string;
         /** @default null */
         moment?: string | null;
+        /** @default  */
+        request_id?: string;
     };
     /**
      * OpenQueueRequest

@@ -58,9 +58,10 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
     marks: Marks
 
 
-class Noted(msgspec.Struct, frozen=True):
+class Noted(msgspec.Struct, frozen=True, omit_defaults=True):
     """A person wrote a note at a moment of a run. `at`: when it was written; `moment`: the moment
-    of the run; both in microseconds UTC. Notes are only added."""
+    of the run; both in microseconds UTC. `request_id`: names the request of its author, "" if it had
+    none. Notes are only added."""
 
     kind: ClassVar[str] = "run.noted.v1"
 
@@ -68,6 +69,7 @@ class Noted(msgspec.Struct, frozen=True):
     author: Author
     moment: int
     text: str
+    request_id: str = ""
 
     def __post_init__(self) -> None:
         hold_names(self, "text")

@@ -33,10 +33,12 @@ class RunMarks(msgspec.Struct, frozen=True):
 
 
 class NoteText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A note for a moment of a run. `moment`: without it, now; for a run that is over, its end."""
+    """A note for a moment of a run. `moment`: without it, now; for a run that is over, its end.
+    `request_id`: names this request; a repeat by the same person adds no second note."""
 
     text: Annotated[str, msgspec.Meta(min_length=1, max_length=2_000, pattern=r"\S")]
     moment: datetime | None = None
+    request_id: Annotated[str, msgspec.Meta(max_length=200)] = ""
 
 
 class ReviewService:
@@ -55,6 +57,7 @@ class ReviewService:
         self._clock_us = clock_us
         self._queries = queries
         self._next_number = next_number
+        self._noting = anyio.Lock()
         self._sums = SumUpLoop(
             journal, clock_us, lambda run, now: queries.value(StoredRuns.summed, run, now)
         )
@@ -82,8 +85,9 @@ class ReviewService:
         return await self.marks(run_id)
 
     async def note(self, run: Run, given: NoteText, author: Author) -> None:
-        """Store a note at a moment of `run` in the name of `author`. Raise BadInput if the run was
-        not there at that moment, Unavailable if the journal cannot be written."""
+        """Store a note at a moment of `run` in the name of `author`, once for each request id. Raise
+        BadInput if the run was not there at that moment, Conflict if the request id belongs to
+        another note, Unavailable if the journal cannot be read or written."""
         now = self._clock_us()
         last = now if run.ended_at is None else run.ended_at
         moment = last if given.moment is None else microseconds(given.moment)
@@ -92,8 +96,25 @@ class ReviewService:
         if not run.requested_at <= moment <= last:
             text = "A note is for a moment from the request of the run to its end."
             raise BadInput(text, where={"path": "/moment"})
-        noted = annotations.Noted(now, author, moment, given.text.strip())
-        await self._journal.append(annotations.stream_about(run.id), [annotations.draft(noted)])
+        stream = annotations.stream_about(run.id)
+        noted = annotations.Noted(now, author, moment, given.text.strip(), given.request_id)
+        async with self._noting:  # a repeat waits for the first one
+            if not await self._is_stored(stream, noted):
+                await self._journal.append(stream, [annotations.draft(noted)])
+
+    async def _is_stored(self, stream: str, noted: annotations.Noted) -> bool:
+        if not noted.request_id:
+            return False
+        for event in await self._journal.read(stream):
+            if event.kind != annotations.Noted.kind:
+                continue
+            known = msgspec.json.decode(event.body, type=annotations.Noted)
+            if (known.author.id, known.request_id) == (noted.author.id, noted.request_id):
+                if known.text != noted.text:
+                    where: dict[str, object] = {"path": "/request_id"}
+                    raise Conflict("This request_id belongs to another note.", where=where)
+                return True
+        return False
 
     async def keep_incident(self, run_id: str, reason: str, author: Author) -> None:
         """Keep a run as an incident, so that it is never archived. Raise NotFound if there is no such
