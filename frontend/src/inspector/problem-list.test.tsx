@@ -6,7 +6,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type { Problem, Problems } from "../api/graphs";
 import { EditorStore, EditorStoreProvider } from "../canvas/editor-store";
 import { type EditorContext, EditorReactContext } from "../edit-actions/editor-context";
-import { addAction } from "../graph/edit";
+import { addAction, removeActions } from "../graph/edit";
 import { graphNow } from "../graph/edit/document-writes";
 import { problemGroups } from "../graph/problems/problem-groups";
 import { RoomProvider, useGraph, useRoom } from "../sync/use-room";
@@ -153,4 +153,16 @@ test("Tab leads from an empty field to what else it has", () => {
   act(() => fields()[0]?.focus());
   press("Tab");
   expect(document.activeElement).toBe(fields()[0]);
+});
+
+test("a field goes with its action, and the keyboard stays in the list, in no other field", () => {
+  act(() => fields()[1]?.focus());
+  type("he");
+  act(() => {
+    server.broadcast((doc) => removeActions(doc, [graphNow(doc).actions[1]?.key ?? ""]));
+    vi.advanceTimersByTime(2_000);
+  });
+  expect(names()).toEqual(["ask", "say"]);
+  expect(document.querySelectorAll("li")).toHaveLength(2);
+  expect(document.activeElement).toBe(document.querySelector("[data-problems]"));
 });

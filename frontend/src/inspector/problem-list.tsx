@@ -1,7 +1,15 @@
 /** Lists the problems of a graph (wrong, to fill in, may go wrong) with their places and fixes. */
 import { ActionIcon, Button } from "@mantine/core";
 import { IconCircleCheck, IconLink, IconStairsDown, IconTool } from "@tabler/icons-react";
-import { createContext, type FocusEvent, type KeyboardEvent, use, useMemo, useState } from "react";
+import {
+  createContext,
+  type FocusEvent,
+  type KeyboardEvent,
+  use,
+  useEffect,
+  useMemo,
+  useState,
+} from "react";
 import type { Problems } from "../api/graphs";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
@@ -61,6 +69,11 @@ function withHeld(open: readonly CheckedGroup[], held: Held | null): readonly Ch
   const at = open.findIndex(({ id }) => held.after.has(id));
   return open.toSpliced(at < 0 ? open.length : at, 0, held.told);
 }
+
+const isIn = (graph: Graph, { place, inputs }: CheckedGroup): boolean =>
+  graph.actions.some(
+    (action) => action.key === place && action.inputs.some(({ path }) => inputs.includes(path)),
+  );
 
 const FIELDS = "[data-fill-in] :is(input:not([type=radio], [type=hidden]), textarea)";
 
@@ -197,8 +210,19 @@ const TITLES: Readonly<Record<ProblemKind, string>> = {
 
 function Part({ kind, told }: { kind: ProblemKind; told: readonly CheckedGroup[] }) {
   const [held, setHeld] = useState<Held | null>(null);
+  const { graph } = useEditorContext();
   const open = told.filter((each) => each.kind === kind);
-  const here = withHeld(open, held);
+  const isGone = held !== null && !isIn(graph, held.told);
+  const here = withHeld(open, isGone ? null : held);
+  useEffect(() => {
+    if (!isGone) return;
+    setHeld(null); // a field that was removed tells of no blur
+    // Not the next field: what somebody still types is not meant for it.
+    const list = document.querySelector<HTMLElement>("[data-problems]");
+    if (list === null || document.activeElement !== document.body) return;
+    list.tabIndex = -1;
+    list.focus();
+  }, [isGone]);
   const hold = (next: CheckedGroup | null) => {
     const at = here.findIndex(({ id }) => id === next?.id);
     const after = new Set(here.slice(at + 1).map(({ id }) => id));

@@ -141,6 +141,15 @@ const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.released.v1": "run",
 };
 
+/** Why a question closed, as the runner names it. */
+const UNANSWERED: Readonly<Record<string, string>> = {
+  lapsed: " and is asked again",
+  held: ", since the run waits; it is asked again",
+  deadline: ": nobody answered in time",
+  restarted: ": the runner was restarted",
+  stopped: ": the run or its action was stopped",
+};
+
 /** A mark in one sentence; empty for what needs none. */
 export function markText(mark: Pick<ReplayMark, "kind" | "by" | "text" | "since">): string {
   const by = mark.by || "somebody";
@@ -183,7 +192,7 @@ export function markText(mark: Pick<ReplayMark, "kind" | "by" | "text" | "since"
     case "run.question_answered.v1":
       return `${isolated(by)} answered${text}`;
     case "run.question_closed.v1":
-      return `Nobody answered in time (${mark.text ?? "closed"})`;
+      return `The question closed without an answer${UNANSWERED[mark.text ?? ""] ?? text}`;
     case "run.ended.v1":
       return `The run is over${text}`;
     default:

@@ -1,6 +1,7 @@
 /** Events of a run are listed in an order in which they can have happened. */
 import { expect, test } from "vitest";
 import type { Run } from "../api/runs";
+import { markText } from "./replay-controls";
 import { eventLines } from "./run-events";
 
 /** An action that the engine says to have begun and ended at these times. */
@@ -95,4 +96,15 @@ test("what held a run, and who let it go on, stand among its events", () => {
   expect(told).toContain("Nothing further begins: Breakpoint before Grip_0.");
   expect(told).toContain("Ben let it go on: one step, Grip_0");
   expect(told).not.toContain("Stop message: attempt 1");
+});
+
+test.each([
+  ["lapsed", "The question closed without an answer and is asked again"],
+  ["held", "The question closed without an answer, since the run waits; it is asked again"],
+  ["deadline", "The question closed without an answer: nobody answered in time"],
+  ["restarted", "The question closed without an answer: the runner was restarted"],
+  ["stopped", "The question closed without an answer: the run or its action was stopped"],
+  ["of a later version", "The question closed without an answer: of a later version"],
+])("a question that closed since it was %s says so", (why, words) => {
+  expect(markText({ kind: "run.question_closed.v1", by: "", text: why })).toBe(words);
 });

@@ -18,11 +18,13 @@ export function AskedLine({ below = false }: { below?: boolean }) {
     runner,
     asked.map(({ question }) => question.id),
   );
-  const mine = asked.filter(({ question }) => known === null || known.get(question.id)?.may);
+  const mine = asked.filter(
+    ({ run, question }) =>
+      !(below && at === `/runs/${run.id}`) && (known === null || known.get(question.id)?.may),
+  );
   const [first] = mine;
   if (first === undefined) return null;
   const { run, question } = first;
-  if (below && at === `/runs/${run.id}`) return null;
   const more = mine.length > 1 ? ` and ${mine.length - 1} more` : "";
   return (
     <span role="alert" className={style.alert} data-below={below || undefined}>

@@ -173,21 +173,28 @@ export function followedBox(
 
 const HANDS_REST = 4_000; // ms without input on the canvas after which the view follows again
 const TYPING = "input, textarea, [contenteditable=true], [role=dialog] *";
+const LOOK_AGAIN = 1_000; // ms
 
 /** Tracks whether the person is using the canvas or typing; the view does not move then. */
 function useHandsOn(frame: RefObject<HTMLElement | null>) {
-  const last = useRef(Number.NEGATIVE_INFINITY);
+  const last = useRef(Number.NEGATIVE_INFINITY); // infinity while something is pressed
   useEffect(() => {
     const room = frame.current;
     if (room === null) return;
-    const touched = () => {
-      last.current = tick();
+    const over = new AbortController();
+    const heard = { passive: true, capture: true, signal: over.signal };
+    const touched = ({ type }: Event) => {
+      const until = type === "pointerdown" ? Number.POSITIVE_INFINITY : tick();
+      last.current = Math.max(last.current, until);
     };
-    const kinds = ["pointerdown", "keydown", "wheel"] as const;
-    for (const kind of kinds) room.addEventListener(kind, touched, { passive: true });
-    return () => {
-      for (const kind of kinds) room.removeEventListener(kind, touched);
+    const moved = ({ buttons }: PointerEvent) => {
+      if (buttons === 0) last.current = Math.min(last.current, tick());
     };
+    for (const kind of ["pointerdown", "keydown", "wheel"])
+      room.addEventListener(kind, touched, heard);
+    for (const kind of ["pointermove", "pointerup", "pointercancel"] as const)
+      window.addEventListener(kind, moved, heard);
+    return () => over.abort();
   }, [frame]);
   const isBusy = useCallback(
     () => tick() - last.current < HANDS_REST || document.activeElement?.matches(TYPING) === true,
@@ -224,22 +231,34 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
   const begun = run === null || lost ? [] : runningKeys(progress, blockOf);
   // Where nothing runs, a person decides about what waits: they look at that.
   const waiting = lost || held === "" || begun.length > 0 ? [] : held.split(" ");
-  const { keys: running, ...drawn } = runningInside(
-    [...begun, ...waiting.map((key) => blockOf?.get(key) ?? key)],
-    now.current,
-    store.expanded.now(),
-  );
-  const key = running.join(" ");
+  const followed = () =>
+    runningInside(
+      [...begun, ...waiting.map((key) => blockOf?.get(key) ?? key)],
+      now.current,
+      store.expanded.now(),
+    );
+  const key = followed().keys.join(" ");
   const { isBusy, release } = useHandsOn(frame);
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
   useEffect(() => {
     const room = frame.current;
-    if (run === null || lost || running.length === 0 || room === null || isBusy()) return;
-    const size = { width: room.clientWidth, height: room.clientHeight };
-    const here = flow.getViewport();
-    const box = followedBox(running, drawn.places, drawn.sizes, size, here.zoom);
-    const next = box && followingViewport(box, size, here);
-    if (next) glideTo(flow, room, next, glide(GLIDE).duration);
+    if (run === null || lost || key === "" || room === null) return;
+    let again: ReturnType<typeof setTimeout> | undefined;
+    const look = () => {
+      if (isBusy()) {
+        // What waits is still there when the hands rest.
+        if (waiting.length > 0) again = setTimeout(look, LOOK_AGAIN);
+        return;
+      }
+      const { keys, places, sizes } = followed();
+      const size = { width: room.clientWidth, height: room.clientHeight };
+      const here = flow.getViewport();
+      const box = followedBox(keys, places, sizes, size, here.zoom);
+      const next = box && followingViewport(box, size, here);
+      if (next) glideTo(flow, room, next, glide(GLIDE).duration);
+    };
+    look();
+    return () => clearTimeout(again);
   }, [run, lost, key]);
   return {
     /** True while a run goes on that the view no longer follows. */

@@ -1,6 +1,7 @@
 /** The dialog that duplicates actions with another value for each copy. */
 import { Button, Checkbox, Group, Modal, NativeSelect, Textarea } from "@mantine/core";
 import { useMemo, useState } from "react";
+import { usePerson } from "../../api/people";
 import { unplaced } from "../../canvas/geometry/arrange";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { asOneEdit, moveActions } from "../../graph/edit";
@@ -17,9 +18,9 @@ import { pathWords } from "../../graph/field-words";
 import type { Key } from "../../graph/model";
 import { nameOf } from "../../graph/relation-words";
 import { announcer } from "../../ui/announcer";
-import { useKeptText } from "../../ui/kept-texts";
+import { textScope, useKeptText } from "../../ui/kept-texts";
 import { isolated } from "../../words/isolated";
-import { freeShifts } from "./copy-places";
+import { freeShifts, sayNothingDrawn } from "./copy-places";
 
 interface Props {
   context: EditorContext;
@@ -62,11 +63,12 @@ function drawBeside(
 
 export function CopiesDialog({ context, actions, onClose }: Props) {
   const { graph } = context;
+  const { person } = usePerson();
   const keys = useMemo(() => new Set(actions), [actions]);
   const own = graph.actions.filter(({ key }) => keys.has(key));
   const inputs = variedInputs(own);
   const [field, setField] = useState(inputs[0] === undefined ? ROBOT : `in/${inputs[0]}`);
-  const [draft, setDraft] = useKeptText(`${context.id}/copies`);
+  const [draft, setDraft] = useKeptText(`copies ${textScope(context.id, person.id)}`);
   const [wantsSeries, setWantsSeries] = useState(true);
   const varied: Varied =
     field === ROBOT ? { kind: "robot" } : { kind: "input", path: field.slice("in/".length) };
@@ -78,11 +80,12 @@ export function CopiesDialog({ context, actions, onClose }: Props) {
   const submit = () => {
     const made = drawBeside(context, keys, varied, { values, inSeries });
     onClose();
-    if (made === null) return;
+    const drawn = (made ?? []).filter((copy) => copy.length > 0);
+    if (drawn.length === 0) return sayNothingDrawn();
     setDraft("");
-    context.select(made.flat());
-    requestAnimationFrame(() => context.view.show(made.flat()));
-    announcer.say(`${made.length} ${made.length === 1 ? "copy" : "copies"} drawn.`);
+    context.select(drawn.flat());
+    requestAnimationFrame(() => context.view.show(drawn.flat()));
+    announcer.say(`${drawn.length} ${drawn.length === 1 ? "copy" : "copies"} drawn.`);
   };
   const [only] = actions;
   const what = actions.length === 1 ? nameOf(graph, only ?? "") : `${actions.length} actions`;

@@ -1,4 +1,5 @@
-/** Free places for copies of actions, as far from the actions as they are to stand. */
+/** What the dialogs that draw copies of actions share: free places for them, and what is said if there are none. */
+import { notifications } from "@mantine/notifications";
 import { type Box, freeSpot, placeAfter } from "../../canvas/geometry/arrange";
 import { CARD, GAP } from "../../canvas/geometry/ranks";
 import { type EditorContext, takenBoxes } from "../../edit-actions/editor-context";
@@ -41,6 +42,11 @@ export function freeShifts(
     taken.push(before);
     return [x - box.x, y - box.y] as const;
   });
+}
+
+/** Says that none was drawn: others have changed or removed the actions since the dialog was read. */
+export function sayNothingDrawn(): void {
+  notifications.show({ message: "Nothing was drawn: the graph has changed. Look at it again." });
 }
 
 const placeBeside = ({ x, y, width, height }: Box, direction: string): Position =>

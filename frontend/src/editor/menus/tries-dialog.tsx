@@ -15,7 +15,7 @@ import type { Key } from "../../graph/model";
 import { nameOf } from "../../graph/relation-words";
 import { announcer } from "../../ui/announcer";
 import { isolated } from "../../words/isolated";
-import { freeShifts } from "./copy-places";
+import { freeShifts, sayNothingDrawn } from "./copy-places";
 
 interface Props {
   context: EditorContext;
@@ -51,10 +51,10 @@ function TriesForm({ context, action, onClose }: Props) {
   const submit = () => {
     const made = drawBeside(context, action, times, failures);
     onClose();
-    if (made === null) return;
+    if (made === null || made.length === 0) return sayNothingDrawn();
     context.select([action, ...made]);
     requestAnimationFrame(() => context.view.show([action, ...made]));
-    announcer.say(`${times - 1} more drawn.`);
+    announcer.say(`${made.length} more drawn.`);
   };
   return (
     <form

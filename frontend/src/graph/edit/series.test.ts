@@ -170,7 +170,7 @@ test("a sentence says beforehand what is drawn", () => {
   expect(
     copiesWords(graphIn(doc), new Set([drive]), PLACE, { values: ["hall", "lab"], inSeries: true }),
   ).toBe(
-    "Draws 2 copies of Drive with place hall, lab, one after another behind it; what follows when all goes well comes after the last copy.",
+    "Draws 2 copies of Drive with place hall, lab, one after another behind it; the last copy leads on to what followed Drive when it ended true.",
   );
   expect(
     copiesWords(graphIn(doc), new Set([drive, look]), ROBOT, {

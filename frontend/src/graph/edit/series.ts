@@ -133,10 +133,21 @@ export function copiesWords(
   const field = varied.kind === "robot" ? "robot" : isolated(pathWords(varied.path));
   const values = copies.values.map(isolated).join(", ");
   const where = copies.inSeries
-    ? "one after another behind it; what follows when all goes well comes after the last copy"
+    ? `one after another behind it${onwardWords(graph, keys, varied)}`
     : "side by side, with no arrows from elsewhere";
   const count = copies.values.length;
   return `Draws ${count === 1 ? "one copy" : `${count} copies`} of ${what} with ${field} ${values}, ${where}.`;
+}
+
+function onwardWords(graph: Graph, keys: ReadonlySet<Key>, varied: Varied): string {
+  const piece = pieceOf(graph, keys, varied);
+  if (typeof piece === "string") return "";
+  const goesOn = graph.relations.some(
+    ({ parent, child, conditions }) =>
+      parent === piece.last && !keys.has(child) && conditions.on_true !== "ignore",
+  );
+  const last = isolated(nameOf(graph, piece.last));
+  return goesOn ? `; the last copy leads on to what followed ${last} when it ended true` : "";
 }
 
 /**

@@ -141,10 +141,10 @@ test("nothing is drawn where the engine would not do exactly that, and a sentenc
 test("a sentence says beforehand what is drawn", () => {
   const [doc, a, b] = handled();
   expect(triesWords(graphIn(doc), a, 3, ["on_error"])).toBe(
-    "Draws 2 more of A, each behind the one before: it begins when that ends with an error. What follows comes after whichever ends otherwise. What follows such an end now follows that of the last one.",
+    "Draws 2 more of A. Each further try begins only if the one before it ended with an error. As soon as one try ends otherwise, the graph goes on from there. If the last one ends with an error, what now follows an error of A begins.",
   );
   expect(triesWords(graphIn(doc), b, 2, ["on_error", "on_false"])).toBe(
-    "Draws one more of B, each behind the one before: it begins when that ends with an error or false. What follows comes after whichever ends otherwise. After such an end of the last one nothing follows.",
+    "Draws one more of B. Each further try begins only if the one before it ended with an error or false. As soon as one try ends otherwise, the graph goes on from there. If the last one ends with an error or false, nothing follows.",
   );
 });
 

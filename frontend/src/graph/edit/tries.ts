@@ -101,17 +101,16 @@ function whyNotByArrows(graph: Graph, key: Key): string | null {
 /** What a person reads before it is drawn. */
 export function triesWords(graph: Graph, key: Key, times: number, failures: Failures): string {
   const more = times === 2 ? "one more" : `${times - 1} more`;
-  const fails = failures.includes("on_false")
-    ? "ends with an error or false"
-    : "ends with an error";
+  const name = nameOf(graph, key);
+  const failure = failures.includes("on_false") ? "an error or false" : "an error";
   const follows = graph.relations.some(
     ({ parent, conditions }) =>
       parent === key && failures.some((end) => conditions[end] !== "ignore"),
   );
-  const last = follows
-    ? "What follows such an end now follows that of the last one."
-    : "After such an end of the last one nothing follows.";
-  return `Draws ${more} of ${isolated(nameOf(graph, key))}, each behind the one before: it begins when that ${fails}. What follows comes after whichever ends otherwise. ${last}`;
+  const then = follows
+    ? `what now follows ${failure} of ${isolated(name)} begins`
+    : "nothing follows";
+  return `Draws ${more} of ${isolated(name)}. Each further try begins only if the one before it ended with ${failure}. As soon as one try ends otherwise, the graph goes on from there. If the last one ends with ${failure}, ${then}.`;
 }
 
 /**
