@@ -1,8 +1,9 @@
 """Finds the actions that may run at the same time, as far as arrows and possible outcomes tell.
 
 See docs/umrf-and-the-engine.md 2.3. It reports too many pairs rather than too few: durations are
-not known. Of a small graph all courses are followed (`courses.together`); of another one combinations of
-outcomes are not examined. But an action that a join waits for is over when the join begins.
+not known. Of a small graph all courses are followed (`courses.together`, decision 155); of another
+one combinations of outcomes are not examined. But an action that a join waits for is over when the
+join begins.
 """
 
 from collections import deque
