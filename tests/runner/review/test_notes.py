@@ -5,6 +5,7 @@ from datetime import datetime, timedelta
 from typing import Any
 
 import httpx
+import pytest
 
 from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
@@ -71,6 +72,20 @@ def test_a_note_that_is_sent_again_with_its_request_id_is_stored_once(
         assert len(send(client, "it squeaked", "two").json()) == 2
         assert len(send(client, "it squeaked", "").json()) == 3
         assert len(send(client, "it squeaked", "").json()) == 4
+
+
+@pytest.mark.long
+def test_a_run_has_a_bounded_number_of_notes(process: RunnerProcess) -> None:
+    with process.client() as client:
+        path = f"/api/runs/{ran(client)['id']}/notes"
+        for number in range(500):
+            assert client.post(path, json={"text": f"note {number}"}).status_code == 201
+        refused = client.post(path, json={"text": "one more"})
+        assert (refused.status_code, refused.json()["detail"]) == (
+            409,
+            "A run has 500 notes at most.",
+        )
+        assert len(client.get(path).json()) == 500
 
 
 def test_a_note_outside_of_the_run_or_without_a_text_is_refused_with_its_place(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Final
 
 import anyio
 import msgspec
@@ -30,6 +30,10 @@ class RunMarks(msgspec.Struct, frozen=True):
     pinned: bool
     note: str
     labels: list[str]
+
+
+#: Notes of one run: each is written with all texts by which the run is found.
+_MOST_NOTES: Final = 500
 
 
 class NoteText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,7 +91,8 @@ class ReviewService:
     async def note(self, run: Run, given: NoteText, author: Author) -> None:
         """Store a note at a moment of `run` in the name of `author`, once for each request id. Raise
         BadInput if the run was not there at that moment, Conflict if the request id belongs to
-        another note, Unavailable if the journal cannot be read or written."""
+        another note or the run has very many, Unavailable if the journal cannot be read or
+        written."""
         now = self._clock_us()
         last = now if run.ended_at is None else run.ended_at
         moment = last if given.moment is None else microseconds(given.moment)
@@ -99,22 +104,16 @@ class ReviewService:
         stream = annotations.stream_about(run.id)
         noted = annotations.Noted(now, author, moment, given.text.strip(), given.request_id)
         async with self._noting:  # a repeat waits for the first one
-            if not await self._is_stored(stream, noted):
-                await self._journal.append(stream, [annotations.draft(noted)])
-
-    async def _is_stored(self, stream: str, noted: annotations.Noted) -> bool:
-        if not noted.request_id:
-            return False
-        for event in await self._journal.read(stream):
-            if event.kind != annotations.Noted.kind:
-                continue
-            known = msgspec.json.decode(event.body, type=annotations.Noted)
-            if (known.author.id, known.request_id) == (noted.author.id, noted.request_id):
-                if known.text != noted.text:
-                    where: dict[str, object] = {"path": "/request_id"}
-                    raise Conflict("This request_id belongs to another note.", where=where)
-                return True
-        return False
+            known = [
+                msgspec.json.decode(event.body, type=annotations.Noted)
+                for event in await self._journal.read(stream)
+                if event.kind == annotations.Noted.kind
+            ]
+            if _is_among(known, noted):
+                return
+            if len(known) >= _MOST_NOTES:
+                raise Conflict(f"A run has {_MOST_NOTES} notes at most.")
+            await self._journal.append(stream, [annotations.draft(noted)])
 
     async def keep_incident(self, run_id: str, reason: str, author: Author) -> None:
         """Keep a run as an incident, so that it is never archived. Raise NotFound if there is no such
@@ -183,3 +182,15 @@ class ReviewService:
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)
         await self._journal.append(expected_runs.STREAM, [draft_of(retired, author.id)])
+
+
+def _is_among(known: Sequence[annotations.Noted], noted: annotations.Noted) -> bool:
+    """Return whether a note has been stored by an earlier request with its request id; raise Conflict
+    if that belongs to another note of its author."""
+    for each in known if noted.request_id else ():
+        if (each.author.id, each.request_id) == (noted.author.id, noted.request_id):
+            if each.text != noted.text:
+                where: dict[str, object] = {"path": "/request_id"}
+                raise Conflict("This request_id belongs to another note.", where=where)
+            return True
+    return False
