@@ -66,7 +66,7 @@ test("the details of an action draw further tries of it, and one undo takes them
   await page.getByRole("button", { name: "Try again …" }).click();
   const tries = dialog(page, "Try DriveTo again");
   await tries.getByRole("combobox", { name: "Try it up to" }).selectOption("3 times");
-  await expect(tries).toContainText("Draws 2 more of DriveTo, each behind the one before");
+  await expect(tries).toContainText("Draws 2 more of DriveTo. Each further try begins");
   expect(await violations(page)).toEqual([]);
   await tries.getByRole("button", { name: "Draw it" }).click();
   await expect(tries).toBeHidden();
