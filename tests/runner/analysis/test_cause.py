@@ -213,6 +213,14 @@ def test_a_halted_graph_names_the_last_end_that_nothing_follows() -> None:
     true = [Observed(5, (*a, b, *_ended(5, "B_0", "true"))), Ended(6, "halted", "on_halted")]
     assert found(LINE, *true) == [], "an arrow follows that, so it was something else"
     both = (state(3, "A_0", "RUNNING"), state(3, "B_0", "RUNNING"))
+    first = [Observed(5, (*both, *_ended(5, "A_0", "false")))]
+    named = found(FORK, *first, Ended(6, "halted", "on_halted"))
+    assert not any("nothing follows" in each for each in named), "how B ended was not seen"
+    alone = graph("task", ("entry", "A"))
+    untold = Observed(4, (state(3, "A_0", "RUNNING"), state(4, "A_0", "FINISHED")))
+    assert found(alone, untold, Ended(6, "halted", "on_halted")) == [
+        "A ended, and nothing follows that: the exit was not reached."
+    ]
     fork = [Observed(5, (*both, *_ended(4, "A_0", "true"), *_ended(5, "B_0", "false")))]
     assert found(FORK, *fork, Ended(6, "halted", "on_halted"))[-1] == sentence
 

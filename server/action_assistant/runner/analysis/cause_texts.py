@@ -63,8 +63,8 @@ def _in_words(cause: Cause, run: Run) -> str:
         case Waiting():
             return _waits_in_words(cause, run, who)
         case NothingFollowed(ended=ended):
-            how = "in error" if ended == "error" else ended
-            return f"{who} ended {how}, and nothing follows that: the exit was not reached."
+            how = " in error" if ended == "error" else f" {ended}" * bool(ended)
+            return f"{who} ended{how}, and nothing follows that: the exit was not reached."
         case EngineRestarted():
             return f"The engine of {run.engine} was restarted; what happened after is unknown."
         case ForeignCause():

@@ -103,8 +103,8 @@ class Waiting(_Evidence, frozen=True, tag="waiting", tag_field="kind"):
 
 
 class NothingFollowed(_Evidence, frozen=True, tag="nothing_followed", tag_field="kind"):
-    """The last action that ran ended with the outcome `ended`, which none of its arrows follows, so that
-    the graph did not reach its exit."""
+    """The last action that ran ended with the outcome `ended` ("" where the robot does not tell it), which
+    none of its arrows follows, so that the graph did not reach its exit."""
 
     ended: str
 
@@ -539,8 +539,10 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
 
 def _dead_ends(run: Run, graph: Graph) -> Iterator[NothingFollowed]:
     """Yield the action whose end halted the graph: the last one that ended, if all its arrows ignore its
-    outcome. Yield nothing where events do not tell which one was the last. `graph`: as it was sent."""
-    if run.end != "halted":
+    outcome. Yield nothing where events do not tell which one was the last, also if one was not seen to
+    end. `graph`: as it was sent."""
+    visits = (visit for action in run.actions.values() for visit in action.visits)
+    if run.end != "halted" or any(visit.until is None for visit in visits):
         return
     keys = {action.full_name: action.key for action in graph.actions}
     ended = _ended_visits(run, places_of(run), run.actions)
