@@ -5,6 +5,7 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { PersonContext } from "../api/people";
 import { RoomProvider } from "../sync/use-room";
+import { answerSockets } from "../testing/browser";
 import { FakeServer } from "../testing/fake-server";
 import { useEditor } from "./use-editor";
 
@@ -14,15 +15,7 @@ let root: Root;
 beforeEach(() => {
   vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
   server = new FakeServer();
-  vi.stubGlobal(
-    "WebSocket",
-    class {
-      constructor(url: string) {
-        // biome-ignore lint/correctness/noConstructorReturn: the fake stands in for the browser's
-        return server.open(url) as never;
-      }
-    },
-  );
+  answerSockets(() => server);
   root = createRoot(document.body.appendChild(document.createElement("div")));
 });
 

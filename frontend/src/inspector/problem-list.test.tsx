@@ -10,25 +10,11 @@ import { addAction, removeActions } from "../graph/edit";
 import { graphNow } from "../graph/edit/document-writes";
 import { problemGroups } from "../graph/problems/problem-groups";
 import { RoomProvider, useGraph, useRoom } from "../sync/use-room";
+import { answerSockets, standInForBrowser } from "../testing/browser";
 import { FakeServer } from "../testing/fake-server";
 import { ProblemList } from "./problem-list";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
-vi.stubGlobal(
-  "ResizeObserver",
-  class {
-    observe() {}
-    unobserve() {}
-    disconnect() {}
-  },
-);
-
-Object.assign(document, { fonts: new EventTarget() });
+standInForBrowser();
 
 let root: Root;
 let server: FakeServer;
@@ -63,15 +49,7 @@ beforeEach(() => {
   for (const name of ["Ask", "Call", "Say"])
     addAction(server.doc, { name, inputs: [{ path: name.toLowerCase(), text }] });
   server.seq = 1;
-  vi.stubGlobal(
-    "WebSocket",
-    class {
-      constructor(url: string) {
-        // biome-ignore lint/correctness/noConstructorReturn: the fake stands in for the browser's
-        return server.open(url) as never;
-      }
-    },
-  );
+  answerSockets(() => server);
   root = createRoot(document.body.appendChild(document.createElement("div")));
   act(() =>
     root.render(

@@ -3,17 +3,13 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { afterEach, beforeEach, expect, test } from "vitest";
 import { PersonContext } from "../api/people";
 import type { Run } from "../api/runs";
+import { standInForBrowser } from "../testing/browser";
 import { RunPage } from "./run-page";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 /** Stands in each name and value of what is hidden: the page shows none of it, even if it has it. */
 const CANARY = "Canary";

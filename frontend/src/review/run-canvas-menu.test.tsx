@@ -3,17 +3,13 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { afterEach, beforeEach, expect, test } from "vitest";
 import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
+import { standInForBrowser } from "../testing/browser";
 import { RunCanvasMenu } from "./run-canvas-menu";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 const graph = fromUmrf({ graph_name: "g", actions: [{ name: "Work", instance_id: 0 }] });
 

@@ -3,18 +3,13 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot } from "react-dom/client";
-import { expect, test, vi } from "vitest";
+import { expect, test } from "vitest";
 import { PersonContext, type SignedIn } from "../api/people";
 import type { Run } from "../api/runs";
+import { standInForBrowser } from "../testing/browser";
 import { NoteHere } from "./run-notes";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
-Object.assign(document, { fonts: new EventTarget() });
+standInForBrowser();
 
 /** Opens the field for a note as this person; returns what it says, and types a text where one is given. */
 function noteOf(person: string, text?: string): string | undefined {

@@ -3,6 +3,7 @@ import { act, StrictMode } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addAction, rename } from "../graph/edit";
+import { answerSockets } from "../testing/browser";
 import { FakeEditStore } from "../testing/fake-device";
 import { FakeServer } from "../testing/fake-server";
 import type { PersistenceOptions } from "./room-connection";
@@ -31,15 +32,7 @@ const drawn = { graph: 0, name: 0 };
 beforeEach(() => {
   vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
   server = new FakeServer();
-  vi.stubGlobal(
-    "WebSocket",
-    class {
-      constructor(url: string) {
-        // biome-ignore lint/correctness/noConstructorReturn: the fake stands in for the browser's
-        return server.open(url) as never;
-      }
-    },
-  );
+  answerSockets(() => server);
   root = createRoot(document.body.appendChild(document.createElement("div")));
 });
 

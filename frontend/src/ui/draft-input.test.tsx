@@ -3,23 +3,11 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { standInForBrowser } from "../testing/browser";
 import { DraftChoice, DraftInput } from "./draft-input";
 import { type LostDraft, pendingDrafts } from "./drafts";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal(
-  "ResizeObserver",
-  class {
-    observe() {}
-    unobserve() {}
-    disconnect() {}
-  },
-);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 let root: Root;
 const onCommit = vi.fn<(value: string) => boolean>();

@@ -3,15 +3,11 @@ import { MantineProvider } from "@mantine/core";
 import { act, type ReactElement } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { standInForBrowser } from "../testing/browser";
 import { LateOpening, useOpening } from "./late-opening";
 import { lazyPart } from "./lazy-part";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 let root: Root;
 let arrive: (missing?: Error) => void;

@@ -3,12 +3,11 @@ import { MantineProvider } from "@mantine/core";
 import { act, type ComponentType } from "react";
 import { createRoot } from "react-dom/client";
 import { afterEach, beforeAll, expect, test, vi } from "vitest";
+import { standInForBrowser } from "../testing/browser";
 import { lazyPart, PartBoundary, preloadParts } from "./lazy-part";
 
 beforeAll(() => {
-  vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-  const media = { matches: false, addEventListener: () => {}, removeEventListener: () => {} };
-  vi.stubGlobal("matchMedia", () => media);
+  standInForBrowser();
 });
 afterEach(() => vi.restoreAllMocks());
 

@@ -8,16 +8,12 @@ import type { EditorContext } from "../../edit-actions/editor-context";
 import { READY_TEMPLATES } from "../../graph/edit";
 import { graphNow } from "../../graph/edit/document-writes";
 import { EMPTY_GRAPH } from "../../graph/model";
+import { standInForBrowser } from "../../testing/browser";
 import { boundedPart } from "../../ui/lazy-part";
 import { TypingField } from "../../ui/typed-ahead";
 import { candidates, QuickAdd } from "./quick-add";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 let root: Root;
 let doc: Y.Doc;

@@ -3,23 +3,19 @@ import { MantineProvider } from "@mantine/core";
 import { Notifications, notifications } from "@mantine/notifications";
 import { act, useMemo, useSyncExternalStore } from "react";
 import { createRoot, type Root } from "react-dom/client";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { afterEach, beforeEach, expect, test } from "vitest";
 import * as Y from "yjs";
 import { PersonContext } from "../../api/people";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { addAction, addParameter, removeActions, rename, setField } from "../../graph/edit";
 import { followGraph } from "../../graph/read";
+import { standInForBrowser } from "../../testing/browser";
 import { graphIn } from "../../testing/edited-graph";
 import { DraftInput } from "../../ui/draft-input";
 import { keptTexts, textScope } from "../../ui/kept-texts";
 import { LostDrafts } from "./lost-drafts";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 const ada = {
   person: { id: "p", name: "Ada", role: "editor" as const },

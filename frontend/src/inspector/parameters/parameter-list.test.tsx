@@ -8,25 +8,11 @@ import { type EditorContext, EditorReactContext } from "../../edit-actions/edito
 import { addAction, connect } from "../../graph/edit";
 import { graphNow } from "../../graph/edit/document-writes";
 import { RoomProvider, useGraph, useRoom } from "../../sync/use-room";
+import { answerSockets, standInForBrowser } from "../../testing/browser";
 import { FakeServer } from "../../testing/fake-server";
 import { ParameterList } from "./parameter-list";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
-vi.stubGlobal(
-  "ResizeObserver",
-  class {
-    observe() {}
-    unobserve() {}
-    disconnect() {}
-  },
-);
-
-Object.assign(document, { fonts: new EventTarget() });
+standInForBrowser();
 
 let root: Root;
 let store: EditorStore;
@@ -58,15 +44,7 @@ beforeEach(() => {
   });
   connect(server.doc, hear, say);
   server.seq = 1;
-  vi.stubGlobal(
-    "WebSocket",
-    class {
-      constructor(url: string) {
-        // biome-ignore lint/correctness/noConstructorReturn: the fake stands in for the browser's
-        return server.open(url) as never;
-      }
-    },
-  );
+  answerSockets(() => server);
   root = createRoot(document.body.appendChild(document.createElement("div")));
   act(() =>
     root.render(

@@ -3,14 +3,10 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { standInForBrowser } from "../../testing/browser";
 import { StartButton } from "./start-button";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-vi.stubGlobal("matchMedia", () => ({
-  matches: false,
-  addEventListener: () => {},
-  removeEventListener: () => {},
-}));
+standInForBrowser();
 
 let root: Root;
 const onStart = vi.fn();
