@@ -16,7 +16,7 @@ _SUBMIT: Final = Room.submit
 
 
 class Page:
-    """Somebody with a graph open. `client`: of two who set a key at once, the higher one wins."""
+    """A person who has a graph open. `client`: of two who set a key at once, the higher one wins."""
 
     def __init__(self, room: Room, author: str, client: int) -> None:
         self._room = room

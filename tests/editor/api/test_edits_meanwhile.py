@@ -1,5 +1,5 @@
-"""What others edit while the server works out an edit of its own: nothing that was acknowledged is removed or
-replaced by an edit that does not know of it, and an edit that was answered with success is there."""
+"""People edit a graph while the server works out an edit of its own: that removes and replaces nothing that was
+acknowledged and that it does not know of, and an edit that was answered with success is there."""
 
 import asyncio
 import copy

@@ -1,6 +1,8 @@
 """A fault in one place keeps Stop from nothing: in a link, in what is kept beside runs, in what looks
 back on them. In virtual time."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ from action_assistant.errors import Conflict, Unavailable
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.monitor import Monitor
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Answer, Leaves, NotSent, Order, unwatched
 from action_assistant.runner.review.background_loops import SumUpLoop
 from action_assistant.runner.review.stored_runs import StoredRuns
@@ -139,6 +142,7 @@ class SlowToGoOn(Open):
     """A robot on whose domain a message that lets a graph go on waits for its turn."""
 
     pauses = True
+    resumed = False
 
     async def resume(
         self, graph_name: str, continue_from: str = "", leaves: Leaves = unwatched
@@ -148,16 +152,21 @@ class SlowToGoOn(Open):
         leaves()
         self.resumed = True
 
-    resumed = False
+
+@asynccontextmanager
+async def paused(david: Open) -> AsyncIterator[tuple[ExecutionService, str]]:
+    """Start a run on David and pause it; give the service and the run."""
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        await control.pause(run, ANN)
+        yield control, run
 
 
 @virtual
 async def test_a_resume_that_waits_for_its_turn_does_not_leave_after_a_stop() -> None:
     david = SlowToGoOn(NEVER)
-    async with fleet(Harness(), David=david) as control:
-        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
-        await until(lambda: control.open[run].run.state == "running")
-        await control.pause(run, ANN)
+    async with paused(david) as (control, run):
 
         async def press() -> None:
             with pytest.raises(Unavailable, match="being stopped"):
@@ -173,11 +182,7 @@ async def test_a_resume_that_waits_for_its_turn_does_not_leave_after_a_stop() ->
 @virtual
 async def test_a_resume_that_was_kept_back_can_be_made_again() -> None:
     david = SlowToGoOn(NEVER)
-    async with fleet(Harness(), David=david) as control:
-        run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
-        await until(lambda: control.open[run].run.state == "running")
-        await control.pause(run, ANN)
-        still = control.rights.require_still
+    async with paused(david) as (control, run):
 
         def gone(*_: object) -> None:
             raise NotSent("The baton of David has changed hands.")
@@ -186,7 +191,6 @@ async def test_a_resume_that_was_kept_back_can_be_made_again() -> None:
             patch.setattr(control.rights, "require_still", gone)
             with pytest.raises(Unavailable, match="changed hands"):
                 await control.resume(run, ANN)
-        assert control.rights.require_still == still
         await control.resume(run, BEN)
         assert david.resumed
 

@@ -1,5 +1,5 @@
-"""What changes between the look at a robot and the moment in which its start message would leave keeps that
-message back: another engine, a second one, a queue or a repeat that was closed."""
+"""A start message is kept back if something changes between the look at its robot and the moment in which it
+would leave: another engine, a second one, a queue or a repeat that was closed."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager

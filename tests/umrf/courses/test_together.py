@@ -1,4 +1,4 @@
-"""What runs at the same time, and what runs again, in the courses of a small graph."""
+"""The courses of a small graph show which actions run at the same time, and which run again."""
 
 from hypothesis import HealthCheck, assume, given, settings
 from msgspec.structs import replace
