@@ -64,6 +64,16 @@ const substitutes = ["d3-color", "lib0/logging"].map((name) => ({
   replacement: resolve(import.meta.dirname, `substitutes/${name.replace("/", "-")}.ts`),
 }));
 
+const tests = readdirSync(resolve(import.meta.dirname, "src"), { recursive: true })
+  .map((name) => `src/${name}`)
+  .filter((name) => /\.test\.tsx?$/.test(name));
+/** Those that replace a module: of what others share it may be there already, and would stay replaced for them. */
+const replacing = tests.filter((name) =>
+  readFileSync(resolve(import.meta.dirname, name), "utf8").includes("vi.mock("),
+);
+const sharing = (suffix: string) =>
+  tests.filter((name) => name.endsWith(`.test${suffix}`) && !replacing.includes(name));
+
 const PUBLIC = resolve(import.meta.dirname, "public");
 /** Fonts of scripts that few graphs are written in are kept when they are first shown. */
 const SELDOM = /-(cyrillic|greek|vietnamese|latin)(-ext)?-wght.*woff2$/;
@@ -340,8 +350,15 @@ export default defineConfig({
     testTimeout: 30_000,
     projects: [
       // What has no document leaves nothing behind, so its files share what they import.
-      { extends: true, test: { name: "pure", include: ["src/**/*.test.ts"], isolate: false } },
-      { extends: true, test: { name: "page", include: ["src/**/*.test.tsx"], isolate: false } },
+      {
+        extends: true,
+        test: { name: "pure", include: sharing(".ts"), isolate: false },
+      },
+      {
+        extends: true,
+        test: { name: "page", include: sharing(".tsx"), isolate: false },
+      },
+      { extends: true, test: { name: "replacing", include: replacing } },
     ],
   },
 });

@@ -4,10 +4,11 @@ import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { expect, test, vi } from "vitest";
 import type { Position } from "../graph/model";
+import { standInForBrowser } from "../testing/browser";
 import { fromUmrf } from "./from-umrf";
 import { GraphView } from "./graph-view";
 
-vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
+standInForBrowser();
 
 /** What a long press asks: whether there was a menu at its place. */
 const { pressed } = vi.hoisted(() => ({ pressed: [] as ((screen: Position) => boolean)[] }));
