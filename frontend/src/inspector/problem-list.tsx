@@ -104,7 +104,7 @@ function Values({ told }: { told: CheckedGroup }) {
     if (!currentTarget.contains(relatedTarget)) hold(null);
   };
   return (
-    // biome-ignore lint/a11y/noStaticElementInteractions: hears what its fields do
+    // biome-ignore lint/a11y/noStaticElementInteractions: people use its fields, and it only listens to these
     <div data-fill-in onFocus={() => hold(told)} onBlur={onBlur} onKeyDown={goOn}>
       <Fields told={told} />
     </div>
