@@ -89,7 +89,8 @@ def docstrings(root: Path) -> Iterator[Docstring]:
 
 
 def undocumented(root: Path) -> list[str]:
-    """Return the public classes and functions of more than ten lines that have no docstring."""
+    """Return the public classes and functions of more than ten lines that have no docstring. The `summary` of
+    a route is its documentation."""
     return [
         f"{path.relative_to(root)}:{node.lineno} {node.name}"
         for path in python_files(root)
@@ -98,7 +99,13 @@ def undocumented(root: Path) -> list[str]:
         and not node.name.startswith("_")
         and (node.end_lineno or 0) - node.lineno > LONG_FUNCTION
         and ast.get_docstring(node) is None
+        and "summary" not in _decorations(node)
     ]
+
+
+def _decorations(node: ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) -> set[str | None]:
+    calls = (each for each in node.decorator_list if isinstance(each, ast.Call))
+    return {keyword.arg for call in calls for keyword in call.keywords}
 
 
 def tsdocs(root: Path) -> Iterator[Docstring]:

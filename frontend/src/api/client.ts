@@ -21,8 +21,11 @@ type Query<T> = { readonly [K in keyof T]: T[K] | undefined } | URLSearchParams;
 
 type Frozen<T> = T extends object ? { readonly [K in keyof T]: Frozen<T[K]> } : T;
 
-/** A UMRF file may also be text, which is sent as it is: its numbers stay as they are written. */
-type Body<T> = string extends keyof T ? T | string : Frozen<T>;
+/**
+ * A UMRF file may also be text, which is sent as it is: its numbers stay as they are written. Bytes, which the OpenAPI
+ * has as a string, are a blob.
+ */
+type Body<T> = T extends string ? Blob : string extends keyof T ? T | string : Frozen<T>;
 
 interface Json<T> {
   content: { "application/json": T };
@@ -45,7 +48,10 @@ type Answers<O> = O extends { responses: infer R }
   ? { [S in keyof R]: R[S] extends Json<infer T> ? T : undefined }
   : never;
 
-type Options = Omit<RequestOptions, "method" | "body">;
+interface Options extends Omit<RequestOptions, "method" | "body"> {
+  /** Reads the headers of an answer that is no refusal. */
+  readonly onHeaders?: (headers: Headers) => void;
+}
 
 /** Sends a request and returns the JSON of the answer. Throws `Refusal` or `Unreachable`. */
 type Send<Paths, M extends Method> = <
@@ -76,11 +82,12 @@ function urlOf(route: string, { path = {}, query = {} }: Request): string {
 function clientOf<Paths>(origin: string): Client<Paths> {
   const send = (method: NonNullable<RequestOptions["method"]>) => {
     return async (route: string, request: Request): Promise<unknown> => {
-      const { path, query, status, ...options } = request;
+      const { path, query, status, onHeaders, ...options } = request;
       const response = await fetchAnswer(origin + urlOf(route, request), { method, ...options });
       if (status !== undefined && response.status !== status) {
         throw new Error(`The server answered ${response.status} instead of ${status}.`);
       }
+      onHeaders?.(response.headers);
       return response.status === 204 ? undefined : response.json();
     };
   };

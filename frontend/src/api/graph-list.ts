@@ -8,7 +8,6 @@ import {
 import { useMemo } from "react";
 import { editor } from "./client";
 import { type GraphSummary, queryKeys } from "./graphs";
-import { fetchAnswer } from "./http";
 import type { EditorApi } from "./schema/editor";
 
 export type GraphName = EditorApi["GraphName"];
@@ -47,9 +46,12 @@ async function fetchPage(
   if (deep) query.set("deep", "true");
   if (label != null) query.set("label", label);
   for (const id of first) query.append("first", id);
-  const answer = await fetchAnswer(`/api/graphs?${query}`, { signal });
-  const graphs = (await answer.json()) as readonly GraphSummary[];
-  return { graphs, total: Number(answer.headers.get("x-total")) };
+  let total = 0;
+  const onHeaders = (headers: Headers) => {
+    total = Number(headers.get("x-total"));
+  };
+  const graphs = await editor.get("/api/graphs", { query, signal, onHeaders });
+  return { graphs, total };
 }
 
 /** Return the graphs of all pages, each once: one that changed meanwhile may stand on two pages. */

@@ -1,4 +1,4 @@
-/** What people send to runs: presses that let led runs go on, each of which counts once, and another version. */
+/** Requests of people to runs: presses, each of which counts once even if its answer is lost, and another version. */
 import { deviceNow } from "../clock/server-clock";
 import type { RunBreakpoint } from "../graph/breakpoints";
 import { newAid } from "../graph/document-keys";

@@ -1,7 +1,6 @@
 /** Questions that led runs ask people, and the answers. */
 import { useQuery } from "@tanstack/react-query";
 import { runnerAt } from "./client";
-import { fetchAnswer } from "./http";
 import { sendPress } from "./presses";
 import type { Run } from "./run-stop";
 import type { Watching } from "./runs";
@@ -55,10 +54,8 @@ export async function sendPhoto(
   question: string,
   photo: Blob,
 ): Promise<string> {
-  const place = `runs/${encodeURIComponent(run)}/questions/${encodeURIComponent(question)}`;
-  const request = { method: "POST", body: photo, timeoutMs: PHOTO_MS } as const;
-  const answer = await fetchAnswer(`${runner}/api/${place}/photo`, request);
-  return ((await answer.json()) as RunnerApi["PhotoStored"]).photo;
+  const request = { path: { run, question }, body: photo, timeoutMs: PHOTO_MS };
+  return (await runnerAt(runner).post("/api/runs/{run}/questions/{question}/photo", request)).photo;
 }
 
 /** The address of a photo that a person gave as an answer. */

@@ -141,7 +141,7 @@ const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.released.v1": "run",
 };
 
-/** Why a question closed, as the runner names it. */
+/** Words for each reason of the runner for closing a question. */
 const UNANSWERED: Readonly<Record<string, string>> = {
   lapsed: " and is asked again",
   held: ", since the run waits; it is asked again",

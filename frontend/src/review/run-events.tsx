@@ -160,7 +160,7 @@ interface Props {
   selected: string | null;
   onPick: (fact: string | null) => void;
   marks: readonly ReplayMark[];
-  /** What people wrote for moments of the run. */
+  /** Notes that people wrote for moments of the run. */
   notes: readonly RunNote[];
   /** The moment at which the replay stands, ms; null at the end. */
   at: number | null;

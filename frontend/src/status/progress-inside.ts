@@ -122,7 +122,7 @@ function keptProgress(before: ProgressByAid, now: ProgressByAid): ProgressByAid 
   return before;
 }
 
-/** What is folded of several actions is made anew each time, and has no name. */
+/** Returns whether both show the same. Progress folded of several actions is a new object each time, and has no name. */
 function isSame(before: Progress | undefined, now: Progress): boolean {
   return before === now || (!now.name && !before?.name && before?.word === now.word);
 }

@@ -15,7 +15,7 @@ import { docWith, graphIn } from "./edited-graph";
 
 type Gesture = readonly [kind: string, one: number, other: number, when: Precondition];
 
-/** What people do while they draw, in any order. */
+/** Gestures of people who draw, in any order. */
 export const gestures = fc.array(
   fc.tuple(
     fc.constantFrom("grow", "grow", "grow", "join", "back", "end", "insert", "lead", "handle"),

@@ -113,6 +113,7 @@ def _export(options: argparse.Namespace) -> int:
         raise CannotStart(f"{options.file} is there already; name another file.")
 
     async def write(file: BinaryIO, branch: Branch, journal: Journal) -> bool:
+        """Write the audit events of one log, one a line, each with its hash of the chain."""
         count = 0
         for stream in await journal.ask(months_of):
             chosen = select(*columns).where(editor_event.c.stream == stream)

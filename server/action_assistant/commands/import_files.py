@@ -71,6 +71,7 @@ class _Bringing:
             self.code = refused(f"{folder}: has no file of an action (*{_ENDING}).")
 
     def file(self, path: Path, *, of_folder: bool = False) -> None:
+        """Import one file: an action into the library, anything else as a graph."""
         body = _bytes(path)
         try:
             is_action = codec.read(body).dialect in ACTION_DIALECTS

@@ -117,6 +117,7 @@ def _verify(options: argparse.Namespace) -> int:
             _say(f"{branch}: {sentence}", makes_line)
 
     async def look(branch: Branch, journal: Journal) -> bool:
+        """Return whether the journal of this branch is sound and still has what the given lines name."""
         revision, newest = max(await journal.ask(recognize)), revisions_of(branch)[-1]
         if revision != newest:
             _say(

@@ -127,6 +127,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
     domain = int(os.environ.get("ROS_DOMAIN_ID", "0")) if options.domain is None else options.domain
 
     def robot(epoch_ms: int) -> EmulatedEngine:
+        """Return an engine that starts at this time; its seed is the same number."""
         return EmulatedEngine(
             options.name,
             index=index,

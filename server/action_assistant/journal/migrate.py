@@ -55,6 +55,7 @@ def upgrade_to(
     a database of the other branch or of a newer version."""
 
     def upgrade(connection: Connection) -> str:
+        """Bring the tables to the wanted revision, and return it."""
         name = _name_of(connection)
         current = recognize(connection)
         ours = revisions_of(branch)

@@ -1,4 +1,4 @@
-/** What the dialogs that draw copies of actions share: free places for them, and what is said if there are none. */
+/** Free places for the copies that dialogs draw, and the message if there are none. */
 import { notifications } from "@mantine/notifications";
 import { type Box, freeSpot, placeAfter } from "../../canvas/geometry/arrange";
 import { CARD, GAP } from "../../canvas/geometry/ranks";

@@ -33,7 +33,7 @@ import { keepingWaits } from "./waits";
 /** The most copies that are made at once. */
 export const MOST_COPIES = 50;
 
-/** What differs in each copy: the robot, or an input of one value, by its path. */
+/** The field that differs in each copy: the robot, or an input of one value, by its path. */
 export type Varied = { readonly kind: "robot" } | { readonly kind: "input"; readonly path: string };
 
 /** Returns the paths of the inputs of these actions that can differ, each once. */
@@ -121,7 +121,7 @@ export function whyNoSeries(graph: Graph, keys: ReadonlySet<Key>, varied: Varied
   return typeof piece === "string" ? piece : null;
 }
 
-/** What a person reads before it is drawn. */
+/** Returns the sentence that a person reads before the copies are drawn. */
 export function copiesWords(
   graph: Graph,
   keys: ReadonlySet<Key>,

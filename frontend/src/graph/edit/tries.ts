@@ -98,7 +98,7 @@ function whyNotByArrows(graph: Graph, key: Key): string | null {
   return null;
 }
 
-/** What a person reads before it is drawn. */
+/** Returns the sentences that a person reads before the tries are drawn. */
 export function triesWords(graph: Graph, key: Key, times: number, failures: Failures): string {
   const more = times === 2 ? "one more" : `${times - 1} more`;
   const name = nameOf(graph, key);

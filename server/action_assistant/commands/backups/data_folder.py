@@ -149,6 +149,7 @@ def checked(
     from action_assistant.editor.log import epochs
 
     async def look() -> int:
+        """Prove the journal, and return the number of its events."""
         url = f"sqlite:///{path}"
         journal = await Journal.open(url, branch=branch, fold=fold_of(branch))
         try:

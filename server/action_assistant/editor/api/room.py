@@ -236,6 +236,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @websocket("/api/graphs/{graph_id:str}/room", guards=[Needs("see")])
     async def room(socket: Socket, graph_id: str) -> None:
+        """Admit a socket to the room of a graph, and serve it until it ends."""
         services, person = app_state.services, person_of(socket)
         stream = h.graph_stream(graph_id)
         try:

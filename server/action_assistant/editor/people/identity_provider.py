@@ -131,6 +131,7 @@ class IdentityProvider:
         more = {"prompt": "login", "max_age": "0"} if again else {}
 
         def written() -> str:
+            """Return the address at the provider where a person signs in."""
             from authlib.oauth2.client import OAuth2Client
 
             client = OAuth2Client(
@@ -215,6 +216,7 @@ class IdentityProvider:
         method = "client_secret_post" if "client_secret_post" in methods else "client_secret_basic"
 
         def prepared() -> tuple[str, dict[str, str], str]:
+            """Return address, headers and body of the request for the tokens."""
             from authlib.oauth2.auth import ClientAuth
             from authlib.oauth2.rfc6749.parameters import prepare_token_request
 
@@ -245,6 +247,8 @@ class IdentityProvider:
         client = self.settings.client_id
 
         def checked() -> dict[str, Any]:
+            """Return the claims of the ID token. Raises `_UnknownKey` where the keys at hand do not fit its
+            signature."""
             from authlib.oidc.core import CodeIDToken
             from joserfc import jwt
             from joserfc.errors import BadSignatureError, InvalidKeyIdError, JoseError
@@ -298,6 +302,7 @@ class IdentityProvider:
         keys = [each for each in given if isinstance(each, dict)] if isinstance(given, list) else []
 
         def read() -> Any:
+            """Return the keys that can check a signature; those of unknown kinds are skipped."""
             from joserfc.errors import JoseError
             from joserfc.jwk import JWKRegistry, KeySet
 

@@ -132,6 +132,7 @@ class Retention:
         at = self._clock_us()
 
         def recorded(by: int) -> Addition:
+            """Return the event of the archived run, whose pieces are numbered after `by`."""
             archived = annotations.RunArchived(
                 at,
                 removed.kept,

@@ -82,6 +82,8 @@ class _Courses:
         self._again = 0
 
     def found(self, budget: int) -> Together | None:
+        """Search every state that the graph can reach. None where the budget is used up or the engine may
+        crash."""
         net = self._net
         first = _Moment(tuple(State(has=has) for has in net.has), 0, 0, 0)
         instant = Instant(net, first.states.__getitem__, 0.0, 0, 0)

@@ -68,6 +68,7 @@ class _Writer:
         return key in self.actions
 
     def graph(self) -> dict[str, Json]:
+        """Return the whole file as a JSON object."""
         graph = self.source
         fields: dict[str, Json] = {"graph_name": graph.name}
         if graph.description:

@@ -30,6 +30,8 @@ class _Compressed(ASGIMiddleware):
         head: HTTPResponseStartEvent | None = None
 
         async def answer(message: Message) -> None:
+            """Hold the head back until the body is known, and send both, compressed where that is worth
+            it."""
             nonlocal head
             if message["type"] == "http.response.start":
                 head = message

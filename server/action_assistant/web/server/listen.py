@@ -140,6 +140,7 @@ class TlsIdentity:
         `config`. Open connections keep theirs."""
 
         def look() -> None:
+            """Renew the certificate, and load one that has changed, as long as the process lives."""
             while True:
                 time.sleep(_LOOK_S)
                 try:
@@ -229,6 +230,7 @@ class ActivityTracker:
         whole = not _waits_for_body(scope)
 
         async def received() -> Any:
+            """Return the next message of the request; refuse a body that comes too slowly or ends early."""
             nonlocal whole
             if whole:
                 return await receive()
