@@ -51,10 +51,10 @@ def block(name: str) -> str:
     found = browser() if name == "browser" else list(importlib.import_module(name).tables())
     others.append(used())
     paces.append(pace())
-    word = "quiet" if max(others) <= QUIET else "busy, so only CPU time says something"
+    word = "quiet" if max(others) <= QUIET else "busy"
     head = (
         f"`make performance ARGS={name}`, {datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC, "
-        f"{facts()}; machine {word} (others used {max(others):.0%} of it before or after); "
+        f"{facts()}; {word} machine (others used {max(others):.0%}); "
         f"a million steps of Python took {paces[0]:.0f} ms before, {paces[1]:.0f} after.\n\n"
     )
     return head + "\n".join("\n".join(lines(table)) + "\n" for table in found)

@@ -1,7 +1,7 @@
 """The words of the glossary, in the texts that people read: OpenAPI of both processes, and the page;
-and the routes that the contracts name.
+and the routes that documents name.
 
-`docs/glossary.md` has for each term, in the last column, words that are not used for it.
+`docs/glossary.md` has for each term, behind *Not*, words that are not used for it.
 """
 
 import re
@@ -16,13 +16,13 @@ from support.openapi import documents
 
 ROOT = Path(__file__).parents[1]
 GLOSSARY = ROOT / "docs" / "glossary.md"
-CONTRACTS = ROOT / "docs" / "contracts.md"
+DOCUMENTS = ROOT / "docs"
 PAGE = ROOT / "frontend" / "src"
 
 # Elsewhere the applications are made in processes of their own, where this is no error.
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
-_ROW = re.compile(r"\| (?P<terms>.*\*\*.*?) \| (?P<meaning>.*?) \|(?: (?P<others>.*?) ?\|)?")
+_ROW = re.compile(r"- (?P<terms>\*\*.*?): (?P<meaning>.*?\.)(?: Not: (?P<others>.*?)\.)?")
 _COMMENTS = re.compile(r"/\*.*?\*/|(?<![:\"'`])//[^\n]*", re.DOTALL)
 _BETWEEN_TAGS = re.compile(r"(?<![=\-])>([^<>{}=;]*[A-Za-z][^<>{}=;]*)<")
 _SHOWN = re.compile(
@@ -30,12 +30,13 @@ _SHOWN = re.compile(
 )
 _SENTENCE = re.compile(r"([\"'`])([A-Z][^\"'`\n]* [^\"'`\n]*)\1")
 _INSERTED = re.compile(r"\$\{[^}]*\}")
-_ROUTE = re.compile(r"((?:GET|POST|PATCH|DELETE)(?:, (?:GET|POST|PATCH|DELETE))*) (/api/[\w/{}-]+)")
+_METHOD = "(?:GET|PUT|POST|PATCH|DELETE)"
+_ROUTE = re.compile(rf"({_METHOD}(?:, {_METHOD})*) (/api/[\w/{{}}-]+)")
 _SOCKETS = frozenset({"/api/graphs/{}/room", "/api/live"})
 
 
 class Term:
-    """A row of the glossary."""
+    """An entry of the glossary."""
 
     def __init__(self, row: re.Match[str]) -> None:
         self.names = [
@@ -48,8 +49,8 @@ class Term:
 
 @cache
 def terms() -> list[Term]:
-    """Return all rows of the glossary."""
-    return [Term(row) for row in map(_ROW.match, GLOSSARY.read_text().splitlines()) if row]
+    """Return all entries of the glossary."""
+    return [Term(row) for row in map(_ROW.fullmatch, GLOSSARY.read_text().splitlines()) if row]
 
 
 def instead(text: str) -> list[str]:
@@ -124,7 +125,7 @@ def test_the_glossary_says_what_each_state_of_a_run_means(schemas: list[dict[str
     assert [state for state in shape["enum"] if f"*{state}*" not in text] == []
 
 
-def test_the_routes_that_the_contracts_name_are_there(schemas: list[dict[str, Any]]) -> None:
+def test_the_routes_that_documents_name_are_there(schemas: list[dict[str, Any]]) -> None:
     there = {
         (method.upper(), re.sub(r"\{\w+\}", "{}", path))
         for schema in schemas
@@ -132,8 +133,9 @@ def test_the_routes_that_the_contracts_name_are_there(schemas: list[dict[str, An
         for method in item
     }
     named = {
-        (method, re.sub(r"\{\w+\}", "{}", path))
-        for methods, path in _ROUTE.findall(CONTRACTS.read_text())
+        (method, re.sub(r"\{\w+\}|\b[A-Z_]+\b", "{}", path))
+        for document in DOCUMENTS.rglob("*.md")
+        for methods, path in _ROUTE.findall(document.read_text())
         for method in methods.split(", ")
     }
     assert len(named) > 25

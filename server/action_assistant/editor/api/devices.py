@@ -110,6 +110,8 @@ def _adding(
         "/api/devices/codes",
         summary="Make a code with which another device of one's own signs in, valid for 2 minutes",
         operation_id="makeDeviceCode",
+        description="The other device sends the code to `POST /api/session/device` and asks `POST "
+        "/api/session/device/answer` until it is signed in.",
         guards=[PersonOnly(), Needs("see")],
     )
     async def make(request: _Asking) -> DeviceCode:

@@ -81,6 +81,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         "/api/config",
         summary="What a page has to know",
         operation_id="getConfig",
+        description="A route of the runner is `runner_url` and its path, behind a proxy too.",
         guards=[Needs("see")],
     )
     async def get_config(request: Request[Any, Any, Any]) -> Config:
@@ -121,6 +122,8 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         "/api/events",
         summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
         operation_id="followEvents",
+        description="Of graphs that one may see; of the audit for owners, of an inbox for its "
+        "person.",
         guards=[Needs("see")],
         media_type="text/event-stream",
         responses={200: answer(StoredEvent, media="text/event-stream", text="An event each time")},

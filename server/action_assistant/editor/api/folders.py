@@ -104,6 +104,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/folder",
         summary="Move a graph into a folder",
         operation_id="fileGraph",
+        description="`folder` null: out of all folders.",
         guards=[Needs("edit")],
     )
     async def file_graph(graph_id: str, data: Filing, request: Asking) -> GraphView:

@@ -48,6 +48,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/rule",
         summary="Say who may see and edit a graph; others who have it open are put out at once",
         operation_id="putGraphRule",
+        description='`readers` and `editors` are each `"all"` or ids of persons and groups.',
         guards=[Needs("share")],
     )
     async def put_graph_rule(graph_id: str, data: Ruling, request: Asking) -> RuleView:

@@ -128,6 +128,9 @@ def _lists(app_state: EditorState) -> list[ControllerRouterHandler]:
         "`q`, `folder` (empty: in none; `deep`: and in folders inside), and `label`, and their number "
         "in X-Total. `first`: ids of graphs that come before the others",
         operation_id="listGraphs",
+        description="A graph out of the caller's sight is in no list, and 404 by its id; drafts are"
+        " in none. Each word of `q` stands in name, description, robots, labels or people there "
+        "now. What is not counted yet has no `problems`.",
         guards=[Needs("see")],
     )
     async def list_graphs(
@@ -182,6 +185,7 @@ def _lists(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Thumbnails of graphs, each named in `of` by its id, a dot and the digest that the list "
         "shows; those that have another digest now are left out",
         operation_id="listThumbnails",
+        description="A complete answer may be kept for ever.",
         guards=[Needs("see")],
     )
     async def list_thumbnails(request: Asking, of: Drawn) -> Response[tuple[ThumbnailOf, ...]]:
@@ -306,6 +310,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/umrf",
         summary="A graph as UMRF, now or after its change `at`; `identities`: with those of its actions",
         operation_id="getUmrf",
+        description="Answers the graph itself.",
         guards=[Needs("see")],
         middleware=[COMPRESSED],
         responses={200: answer(UmrfGraph)},
@@ -340,6 +345,9 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Where led runs of a graph wait, as a start of it after its change `at` names that; with "
         "`inside` also in the graphs inside, as they are now, for a start that opens them",
         operation_id="getBreakpoints",
+        description="Answers what `breakpoints` of a start takes. Those of the graphs inside have "
+        '`inside`, the name of their graph: a start with `levels: "opened"` keeps them wherever '
+        "that stands, any other is refused with them.",
         guards=[Needs("see")],
     )
     async def get_breakpoints(
@@ -371,6 +379,9 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Merge a text, edited from that of the change `seq`, into a graph: as one edit, or not at "
         "all where others have changed the same meanwhile",
         operation_id="putUmrf",
+        description="`seq` of the answer is the number of this edit, `merged` whether changes after"
+        " the `seq` of the request came before it. 409 with `where.keys`: others have changed "
+        "these keys.",
         guards=[Needs("edit")],
         opt=reads(UmrfGraph),
         request_max_body_size=BODY_LIMIT,

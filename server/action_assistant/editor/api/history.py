@@ -148,6 +148,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/blame",
         summary="Who gave each field of an action, arrow or note the value that it has, and when",
         operation_id="getBlame",
+        description='`of` is the key of an action, arrow or note; "" is the graph.',
         guards=[Needs("see")],
         middleware=[COMPRESSED],
     )

@@ -80,6 +80,8 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/actions",
         summary="The actions of the library, and those that only graphs know, by name",
         operation_id="listActions",
+        description="The documents of these actions are graphs of `kind` `action`, at "
+        "`/api/graphs/{graph_id}` and below.",
         guards=[Needs("see")],
     )
     async def list_actions() -> list[LibraryAction]:

@@ -167,6 +167,8 @@ def _confirming(
         status_code=200,
         summary="Confirm who one is with a passkey",
         operation_id="confirmByPasskey",
+        description="Answers the sealed confirmation. A challenge works once, in its session, for "
+        "two minutes.",
         request_max_body_size=_BODY,
         guards=[PersonOnly(), Needs("see")],
     )

@@ -106,6 +106,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="What a sub-graph of chosen actions would be, or why there is none; stores nothing",
         operation_id="lookAtExtraction",
+        description="The caller applies the `changes` in the room of the graph around it.",
         guards=[Needs("see")],
     )
     async def look_at_extraction(graph_id: str, data: Extracting) -> ExtractionLook:
@@ -118,6 +119,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Make a new graph of chosen actions, in the folder of the graph around it, which is "
         "changed by who asks",
         operation_id="makeSubGraph",
+        description="409 if the task may differ and `otherwise` is not true.",
         guards=[Needs("edit")],
     )
     async def make_subgraph(
@@ -144,6 +146,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="What a graph would have instead of an action that stands for another, or why nothing; "
         "stores nothing",
         operation_id="lookAtUnpacking",
+        description="The caller applies the `changes` in the room of the graph.",
         guards=[Needs("see")],
     )
     async def look_at_unpacking(graph_id: str, data: UnpackingAction) -> UnpackingLook:

@@ -146,6 +146,7 @@ def _of_programs(
         status_code=200,
         summary="Fetch the token, once a person has confirmed the code",
         operation_id="claimLogin",
+        description="`state` is `waiting`, `slower`, `granted`, `refused` or `gone`.",
         request_max_body_size=_BODY,
         guards=[Open()],
     )

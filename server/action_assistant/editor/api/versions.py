@@ -46,6 +46,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/versions",
         summary="Publish a graph as it is, or as it was after its change `seq`",
         operation_id="publishVersion",
+        description="Without label and note an existing version with the same graphs inside is "
+        "answered. 413 for a graph that is too large to be run.",
         guards=[Needs("edit")],
         responses={200: answer(VersionView, text="It had been published before")},
     )
@@ -104,6 +106,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Where led runs of a version wait, as a start of it names that: in its graph as that was "
         "then, and in the graphs inside, as they are now, for a start that opens them",
         operation_id="getVersionBreakpoints",
+        description="Answers what `breakpoints` of a start takes. Those of the graphs inside have "
+        '`inside`, the name of their graph: a start with `levels: "opened"` keeps them wherever '
+        "that stands, any other is refused with them.",
         guards=[Needs("see")],
     )
     async def get_version_breakpoints(version_id: str) -> list[Breakpoint]:

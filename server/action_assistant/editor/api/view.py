@@ -97,6 +97,7 @@ def routes(
         "/api/view/graph/events",
         summary="Tells that the graph of a link has changed, without an end (SSE)",
         operation_id="followViewedGraph",
+        description="Sends `{}` when the graph may have changed.",
         guards=[OfLink()],
         responses={
             200: answer(SharedGraphChanged, media="text/event-stream", text="A change each time")

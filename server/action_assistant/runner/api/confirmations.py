@@ -69,6 +69,8 @@ def _asking(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/confirmations",
         summary="Ask one's other devices to confirm who one is",
         operation_id="askToConfirm",
+        description='One\'s other devices get `{type: "confirm", asked}` over the live socket. An '
+        "answer counts once, from another device.",
         guards=[PersonOnly(), Needs("see")],
     )
     async def ask(data: JSONBody[ConfirmationWanted], request: _Asking) -> ConfirmationAsked:

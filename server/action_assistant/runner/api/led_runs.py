@@ -31,6 +31,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/go_on",
         operation_id="goOn",
+        description="Answered once stored.",
         status_code=202,
         summary="Let a held run go on: its robots may begin to move",
         opt=reads(GoOnRequest),
@@ -46,6 +47,8 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/step",
         operation_id="stepRun",
+        description="Answered once stored. `over` names an opened sub-graph as `levels` of its "
+        "actions do.",
         status_code=202,
         summary="Let one action of a held run begin, then hold it again: a robot may begin to move",
         opt=reads(StepRequest),
@@ -61,6 +64,8 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/wait",
         operation_id="waitRun",
+        description="Answered once stored. `held.how` is `trouble`, `wait`, `step` or `breakpoint`;"
+        " absent: `trouble`.",
         status_code=202,
         summary="Let a led run begin nothing further; what is under way goes on",
         opt=reads(WaitRequest | None),
@@ -74,6 +79,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @put(
         "/api/runs/{run:str}/breakpoints",
         operation_id="setBreakpoints",
+        description="The `test` of a value is `==`, `!=`, `<`, `<=`, `>` or `>=`.",
         status_code=202,
         summary="Set where a led run waits; taking one away is a start",
         opt=reads(BreakpointsRequest),
@@ -89,6 +95,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/outcome",
         operation_id="giveOutcome",
+        description="Of people only.",
         status_code=200,
         summary="Give the outcome of an action in a led run, where nothing shows it",
         opt=reads(WordRequest),

@@ -70,6 +70,9 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/questions/{question:str}/answer",
         operation_id="answerQuestion",
+        description="Of people only. 409 for a question that is not open any more: `where` has "
+        "`answered_by`, `at` and `value`, or `why` (`lapsed`, `held`, `deadline`, `restarted`, "
+        "`stopped`).",
         status_code=200,
         summary="Answer a question: a robot may begin to move",
         opt=reads(AnswerRequest),
@@ -88,6 +91,8 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs/{run:str}/questions/{question:str}/photo",
         operation_id="sendPhoto",
+        description="At most 8 MB, stored as it is; the answer is `{photo}`, the id to answer with."
+        " Refused once the question is not open.",
         status_code=200,
         summary="Send a photo for a question, as the bytes of a JPEG, PNG or WebP file",
         request_max_body_size=LARGEST_PHOTO,

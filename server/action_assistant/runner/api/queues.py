@@ -40,6 +40,9 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/queue",
         operation_id="getQueue",
+        description="A graph out of sight has `hidden: true`: robots, state and person are given. "
+        'The live socket says `{type: "queue", number, yours, ready_at}` when the queue has '
+        "changed.",
         summary="The starts that wait, in their order, each with why it waits",
         guards=[Needs("see")],
     )
@@ -49,6 +52,8 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/queue",
         operation_id="enterQueue",
+        description="`start` is a start, whose `request_id` names the entry. Answers the whole "
+        "queue.",
         summary="Put a start into the queue of its robots; on robots it starts nothing",
         opt=reads(QueueRequest, Script=Script) | COUNTED,
         responses={200: answer(QueueShown, text="It had been put there before")},
@@ -90,6 +95,8 @@ def _of_entry(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/queue/{entry:str}/start",
         operation_id="startEntry",
+        description="Of people only. `look` is that of the newest look: another one is 409 with "
+        "`where.differs`. Starting an entry again answers its run.",
         summary="Start an entry of the queue at its turn, exactly as it was looked at",
         opt=reads(TurnRequest),
         responses={200: answer(views.RunShown, text="It had been started before")},
@@ -156,6 +163,8 @@ def _of_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/queue/robots/{name:str}/open",
         operation_id="openQueue",
+        description="Of people only. `closing` is that of the closed queue: another one is 409 with"
+        " `where.closing`.",
         status_code=200,
         summary="Open the closed queue of a robot again after a look; on robots it starts nothing",
         opt=reads(OpenQueueRequest),

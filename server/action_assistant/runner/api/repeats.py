@@ -51,6 +51,8 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/repeats",
         operation_id="openRepeat",
+        description="`start` is a start, whose `request_id` names the repeat. A run of it has "
+        "`repeat {id cell}`.",
         summary="Open a repeat of a start: N times, or a grid of values; on robots it starts nothing",
         opt=reads(RepeatRequest, Script=Script) | COUNTED,
         responses={200: answer(RepeatShown, text="It had been opened before")},
@@ -101,6 +103,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/repeats/{repeat:str}/table",
         operation_id="exportRepeat",
+        description="`parquet` of the repeat says whether that format is there, else it is 503.",
         summary="The table of a repeat as a file: csv, or parquet where pyarrow is installed",
         guards=[Needs("see")],
         responses={200: answer(FileBytes, media="text/csv")},
@@ -128,6 +131,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/repeats/{repeat:str}/start",
         operation_id="startCell",
+        description="Of people only. `cell` is the `next` one; starting one again answers its run.",
         summary="Say that all is set back, and start the next run of a repeat",
         opt=reads(NextRequest),
         responses={200: answer(views.RunShown, text="It had been started before")},
@@ -162,6 +166,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/repeats/{repeat:str}/open",
         operation_id="reopenRepeat",
+        description="Of people only.",
         status_code=200,
         summary="Open a closed repeat again after a look; on robots it starts nothing",
         opt=reads(ReopenRequest),

@@ -237,6 +237,7 @@ def _incident(services: RunnerServices) -> ControllerRouterHandler:
     @post(
         "/api/runs/{run:str}/incident",
         operation_id="keepIncident",
+        description="The run is never archived.",
         status_code=200,
         summary="Keep a run from being archived, and get all that is known of it as a ZIP file",
         guards=[Needs("share")],

@@ -191,6 +191,8 @@ def _rules(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/rights",
         summary="Set who may start on a robot, and whether it has a baton",
         operation_id="setRobotRights",
+        description="What is missing is off, except `limits`, `hardware_stop`, `page_presence` and "
+        "`health`, which stay then.",
         guards=[Needs("share")],
     )
     async def set_rights(name: str, data: RightsWanted, request: _Asking) -> Robot:
@@ -313,6 +315,7 @@ def _drills(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/drills",
         summary="Record a Stop drill: a run there that was stopped, and what a person saw",
         operation_id="recordDrill",
+        description="Of people only.",
         guards=[PersonOnly(), Needs("operate")],
     )
     async def record(name: str, data: DrillRequest, request: _Asking) -> Robot:
@@ -339,6 +342,7 @@ def _releases(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=204,
         summary="Tell a runner on another computer that a version is released",
         operation_id="storeRelease",
+        description="For a runner with a data folder of its own.",
         guards=[Needs("share")],
     )
     async def store(version: str, data: Release, request: _Asking) -> None:

@@ -444,6 +444,7 @@ def _index(services: RunnerServices) -> ControllerRouterHandler:
     @post(
         "/api/robots/{name:str}/index",
         operation_id="writeIntoIndex",
+        description="409 with all obstacles.",
         status_code=200,
         summary="Write graphs inside of a task into the folder that a robot indexes",
         opt=reads(IndexWriteRequest) | COUNTED,

@@ -140,6 +140,10 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs",
         summary="Start a version, at most once per request_id",
         operation_id="startRun",
+        description="A start that rights refuse is 403 or 409 with `where.item` `right`, `baton`, "
+        "`service`, `confirm`, `watched`, `drill`, `released`, `limit`, `pressed` or `health`. A run "
+        "that its robot's hardware stop stopped has the alarm `hardware_stop`, one without a visible "
+        "page `page_missing`, a led run that a limit stopped `led_limit`.",
         opt=reads(StartRequest, Script=Script) | COUNTED,
         responses={200: answer(views.RunShown, text="It had been started before")},
         guards=[StartNeeds(services, "start")],
@@ -166,6 +170,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/starts/{request_id:path}",
         summary="The runs, or the entry of the queue, that a start has become, by its request_id",
         operation_id="getStart",
+        description="Ids may have slashes; `queued` is the entry of the queue that it has become.",
         guards=[Needs("see")],
     )
     async def started(request_id: str, request: _Asking) -> views.StartShown:
@@ -274,7 +279,14 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
-    @get("/api/runs", summary="Runs, newest first", operation_id="listRuns", guards=[Needs("see")])
+    @get(
+        "/api/runs",
+        summary="Runs, newest first",
+        operation_id="listRuns",
+        description="A run of a graph out of sight has `hidden: true` and only engines, state, times, "
+        "proof, and who started and stopped it. Its other routes are 403; Stop is 202.",
+        guards=[Needs("see")],
+    )
     async def listed(
         request: _Asking,
         graph: str | None = None,
@@ -521,6 +533,8 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/approvals",
         summary="The approvals of a graph, by its digest",
         operation_id="listApprovals",
+        description="Of a start with values, overrides or several robots `digest` is the "
+        "`order_digest` of its pre-flight, else the tree digest.",
         guards=[Needs("see")],
     )
     async def approvals(

@@ -73,6 +73,8 @@ def routes(services: RunnerServices, links: ViewLinks) -> list[ControllerRouterH
         "/api/view/run/events",
         summary="The states of the run of a link, as they come, until it is over (SSE)",
         operation_id="followViewedRun",
+        description='Sends `{type: "run", run}`, and each second `{type: "beat", at, seen}` until '
+        "the run is over.",
         guards=[OfLink()],
         responses={
             200: answer(

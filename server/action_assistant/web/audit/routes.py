@@ -25,6 +25,7 @@ def audit_routes(
         "/api/audit",
         summary="Who did what, when and from where, as this process has it; the newest first",
         operation_id="listAudit",
+        description="`before` is the cursor of the next page.",
         guards=[Needs("share")],
         responses={200: answer(AuditPage)},
     )

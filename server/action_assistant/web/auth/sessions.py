@@ -592,6 +592,7 @@ def revocation(
         status_code=204,
         summary="Tell this process that a person has ended one of their own sessions",
         operation_id="tellEndedSession",
+        description="For a runner with a data folder of its own.",
         request_max_body_size=_BODY,
         guards=[Open()],
     )
