@@ -1,4 +1,6 @@
-/** Requests of people to runs: presses, each of which counts once even if its answer is lost, and another version. */
+/**
+ * Presses of people on runs, each of which counts once even if its answer is lost; they may also bring another version.
+ */
 import { deviceNow } from "../clock/server-clock";
 import type { RunBreakpoint } from "../graph/breakpoints";
 import { newAid } from "../graph/document-keys";

@@ -1,8 +1,10 @@
 /** Before a start: what is looked at, and who has said yes. */
-
+import { useQuery } from "@tanstack/react-query";
 import type { RunBreakpoint } from "../graph/breakpoints";
 import { editor, runnerAt } from "./client";
 import type { LedOrder } from "./led-runs";
+import { useLive } from "./page-link";
+import { usePerson } from "./people";
 import type { Preflight } from "./robots";
 import type { Inside, Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -42,8 +44,21 @@ export interface EarlierValues {
 
 const LOOKED_THROUGH = 100; // runs of the graph, the newest
 
+/** Query the values of the newest start of a graph, by this person if there is one. `asks`: it asks for some. */
+export function useEarlierValues(graph: string, asks: boolean) {
+  const { runner } = useLive();
+  const { person } = usePerson();
+  return useQuery({
+    queryKey: ["runs", "values", graph, person.id],
+    queryFn: ({ signal }) => fetchEarlierValues(runner ?? "", graph, person.id, signal),
+    enabled: asks && runner !== undefined,
+    staleTime: 0,
+    gcTime: 0,
+  });
+}
+
 /** Fetch the values with which the graph was last started by a person, or else by anybody; null for none. */
-export async function fetchEarlierValues(
+async function fetchEarlierValues(
   runner: string,
   graph: string,
   person: string,

@@ -18,7 +18,8 @@ import type { PlaceMap } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { FoldedFrame } from "../../canvas/folding/folded-frame";
 import { CARD } from "../../canvas/geometry/ranks";
-import { arrowAt } from "../../canvas/hit-test";
+import { arrowAt, nodeAt } from "../../canvas/hit-test";
+import { useMenuPress } from "../../canvas/menu-press";
 import { edgeTypes, nodeTypes } from "../../canvas/node-types";
 import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
@@ -39,7 +40,6 @@ import { isolated } from "../../words/isolated";
 import style from "./editable-canvas.module.css";
 import type { useCanvasElements } from "./use-canvas-elements";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
-import { useContextMenu } from "./use-context-menu";
 import { useLineEditing } from "./use-line-editing";
 import { usePinch, ZOOM } from "./use-pinch";
 
@@ -54,6 +54,20 @@ const MORE_KEYS = ["Shift", "Meta", "Control"];
 const PLAIN = { hideAttribution: true };
 const NOTES = ".react-flow__node-note, .react-flow__node-folded";
 const NODE_TYPES = { ...nodeTypes, folded: FoldedFrame };
+
+/**
+ * Returns the event handlers that open the context menu at a right click or a long press, for the element there. That
+ * is selected unless it is part of the selection.
+ */
+function useContextMenu(context: EditorContext) {
+  return useMenuPress((screen) => {
+    const target = nodeAt(screen) ?? arrowAt(screen);
+    if (target === null) context.select([]);
+    else if (!context.selection.has(target)) context.select([target]);
+    context.openOverlay({ kind: "menu", screen });
+    return true;
+  });
+}
 
 interface Props {
   context: EditorContext;

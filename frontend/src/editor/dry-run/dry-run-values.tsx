@@ -3,9 +3,8 @@ import { Button, Popover } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconForms } from "@tabler/icons-react";
 import { useEffect, useMemo, useState } from "react";
-import type { StartValues } from "../../api/starts";
+import { type StartValues, useEarlierValues } from "../../api/starts";
 import type { DryRun } from "../../dry-run/use-dry-run";
-import { useEarlierValues } from "../../status/earlier-values";
 import {
   type Drafts,
   firstDrafts,

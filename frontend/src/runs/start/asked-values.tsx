@@ -13,8 +13,8 @@ import {
   fetchWantedApprovals,
   type StartFrom,
   type StartValues,
+  useEarlierValues,
 } from "../../api/starts";
-import { useEarlierValues } from "../../status/earlier-values";
 import {
   type Drafts,
   firstDrafts,
