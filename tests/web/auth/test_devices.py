@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from action_assistant.errors import CannotStart, Conflict, NotFound, TooMany, Unauthenticated
@@ -41,6 +41,7 @@ def session(name: str = "Ada") -> Session:
         st.sampled_from(["open", "claim", "yes", "no", "collect", "wait", "cancel"]), max_size=25
     )
 )
+@example(["claim", "yes", "cancel", "collect"])
 def test_no_order_of_steps_signs_a_device_in_that_was_not_confirmed(steps: list[str]) -> None:
     clock, mine, other = Clock(), session(), session("Eve")
     codes = DeviceCodes(clock)

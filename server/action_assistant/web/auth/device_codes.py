@@ -144,7 +144,8 @@ class DeviceCodes:
 
     def cancel(self, id_: str, session: Session) -> None:
         """Make a code invalid. Raise NotFound when it is over."""
-        del self._pending[self._of(id_, session).id]
+        found = self._of(id_, session)  # before the look-up below: it puts another dict there
+        del self._pending[found.id]
 
     def confirmed(self, claim: str) -> Confirmed | None:
         """Return the session that the other browser follows; None while the person has not answered.
