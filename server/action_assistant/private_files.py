@@ -13,6 +13,7 @@ from typing import Final, NamedTuple, TypeVar
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.random_ids import random_id
 
 log: Final = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -95,6 +96,28 @@ def read_json(path: Path, kind: type[_T]) -> _T:
         return msgspec.json.decode(content, type=kind)
     except (ValueError, RecursionError) as error:  # no text, no JSON, too deep, or another form
         raise DamagedFile(str(error)) from error
+
+
+def read_logged(path: Path, kind: type[_T]) -> _T | None:
+    """Return the value in a small JSON file; None, with a line in the log, if it holds no value of this
+    kind. Raise OSError if the file cannot be read."""
+    try:
+        return read_json(path, kind)
+    except DamagedFile as error:
+        log_unreadable(path, error)
+        return None
+
+
+def write_json(
+    path: Path, value: object, kind: type[object] | None = None, *, is_durable: bool = True
+) -> None:
+    """Write a value as a private JSON file, also while the other process writes it; its folder is made.
+    What was there before is kept beside it if it holds no value of this `kind` (by default the value's
+    type). Raise OSError if it cannot be written."""
+    make_folder(path.parent)
+    keep_damaged(path, kind or type(value))
+    part = path.with_name(f"{path.name}.{random_id()}.part")
+    replace_file(path, msgspec.json.encode(value), part=part, is_durable=is_durable)
 
 
 def log_unreadable(path: Path, error: OSError | DamagedFile) -> None:

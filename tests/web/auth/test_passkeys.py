@@ -246,7 +246,7 @@ def test_a_full_disk_registers_nothing_and_confirms_all_the_same(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("action_assistant.web.auth.passkeys.replace_file", full)
+        patch.setattr("action_assistant.private_files.replace_file", full)
         with pytest.raises(Unavailable, match="No space left"):
             bench.register(mari, second)
         bench.verify(mari, key.get(bench.options(mari)))

@@ -338,10 +338,6 @@ class GraphRights:
             return identity.person.role == OWNER
         return may_see(rule_at(None, folder, self._folders), identity)
 
-    def sees_all_folders(self, identity: Identity) -> bool:
-        """Return whether an identity sees every folder."""
-        return all(self.sees_folder(folder, identity) for folder in self._folders)
-
     def caller_sees_folder(self, folder: str) -> bool:
         """Return whether the client whose request is being answered may see a folder. True where
         the work is for no client, or for one without an identity."""

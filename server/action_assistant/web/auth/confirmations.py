@@ -18,17 +18,7 @@ from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 import msgspec
 
 from action_assistant.errors import BadInput, Unauthenticated, Unavailable
-from action_assistant.private_files import (
-    DamagedFile,
-    FileState,
-    keep_damaged,
-    log_unreadable,
-    make_folder,
-    read_json,
-    replace_file,
-    state_of,
-)
-from action_assistant.random_ids import random_id
+from action_assistant.private_files import FileState, read_logged, state_of, write_json
 from action_assistant.web.auth.keys import Keys, Session
 
 log: Final = logging.getLogger(__name__)
@@ -182,12 +172,8 @@ class Confirmations:
         """Store a confirmation in memory and as a file. If the file cannot be written, log this;
         with `is_stored`, raise Unavailable."""
         self._remember(made.session, self._known_now(made))
-        path = self._path(made.session)
-        part = self._folder / f"{made.session}.{random_id()}.part"  # both processes may write
         try:
-            make_folder(self._folder)
-            keep_damaged(path, Confirmation)
-            replace_file(path, msgspec.json.encode(made), part=part, is_durable=False)
+            write_json(self._path(made.session), made, is_durable=False)
         except OSError as error:
             if is_stored:
                 raise Unavailable(
@@ -202,10 +188,8 @@ class Confirmations:
 
     def _read(self, path: Path, session_id: str) -> Confirmation | None:
         """Return the confirmation in a file; None if it is not genuine. Raise OSError."""
-        try:
-            found = read_json(path, Confirmation)
-        except DamagedFile as error:
-            log_unreadable(path, error)
+        found = read_logged(path, Confirmation)
+        if found is None:
             return None
         genuine = hmac.compare_digest(self._seal(found).encode(), found.seal.encode())
         is_past = found.at <= self._clock() + _SKEW_S

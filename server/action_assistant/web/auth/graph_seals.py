@@ -19,17 +19,7 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Unavailable
 from action_assistant.kit.retrying_thread import RetryingThread
-from action_assistant.private_files import (
-    DamagedFile,
-    FileState,
-    keep_damaged,
-    log_unreadable,
-    make_folder,
-    read_json,
-    replace_file,
-    state_of,
-)
-from action_assistant.random_ids import random_id
+from action_assistant.private_files import FileState, read_logged, state_of, write_json
 from action_assistant.web.auth.graph_rules import OPEN, Rule
 from action_assistant.web.auth.keys import Keys
 
@@ -130,7 +120,7 @@ class RulesFile:
         try:
             state = state_of(self._path)
             if state != self._read:
-                stored = _statement_in(self._path)
+                stored = read_logged(self._path, Statement)
                 self._read = state
                 if stored is not None:
                     self._take(stored)
@@ -180,19 +170,5 @@ class RulesFile:
         return True
 
     def _replace(self) -> None:
-        make_folder(self._path.parent)
-        part = self._path.with_name(
-            f"{FILE}.{random_id()}.part"
-        )  # the other process may write, too
-        keep_damaged(self._path, Statement)
-        replace_file(self._path, msgspec.json.encode(self._newest), part=part)
+        write_json(self._path, self._newest, Statement)
         self._unwritten = False
-
-
-def _statement_in(path: Path) -> Statement | None:
-    """Return the statement in a file; None for a damaged one. Raise OSError."""
-    try:
-        return read_json(path, Statement)
-    except DamagedFile as error:
-        log_unreadable(path, error)
-        return None

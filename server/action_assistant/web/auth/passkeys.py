@@ -21,14 +21,11 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Unavailable
 from action_assistant.private_files import (
-    DamagedFile,
     FileState,
-    keep_damaged,
     log_unreadable,
-    make_folder,
-    read_json,
-    replace_file,
+    read_logged,
     state_of,
+    write_json,
 )
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
@@ -94,7 +91,8 @@ class PasskeyFiles:
             state = state_of(path)
             if known is None or known[0] != state:
                 last = _UNREAD if known is None else known[1]
-                known = (state, _passkeys_in(path, last))
+                read = read_logged(path, PasskeyFile)
+                known = (state, last if read is None else read)
                 self._read[person] = known
         except FileNotFoundError:
             self._read.pop(person, None)
@@ -110,24 +108,11 @@ class PasskeyFiles:
         if self.of(person) is _UNREAD:
             raise Unavailable(f"{self._folder / person}.json cannot be read, so it is not changed.")
         try:
-            make_folder(self._folder)
-            keep_damaged(self._folder / f"{person}.json", PasskeyFile)
-            part = self._folder / f"{person}.{random_id()}.part"
-            replace_file(self._folder / f"{person}.json", msgspec.json.encode(file), part=part)
+            write_json(self._folder / f"{person}.json", file)
         except OSError as error:
             raise Unavailable(
                 f"It could not be written to {self._folder}: {error.strerror}."
             ) from error
-
-
-def _passkeys_in(path: Path, last: PasskeyFile) -> PasskeyFile:
-    """Return the passkeys in a file, or those of the last time (`last`) if it is damaged. Raise
-    OSError."""
-    try:
-        return read_json(path, PasskeyFile)
-    except DamagedFile as error:
-        log_unreadable(path, error)
-        return last
 
 
 class _Challenge(NamedTuple):

@@ -21,14 +21,11 @@ from action_assistant.kit.retrying_thread import RetryingThread
 from action_assistant.private_files import (
     DamagedFile,
     FileState,
-    keep_damaged,
     log_unreadable,
-    make_folder,
     read_json,
-    replace_file,
     state_of,
+    write_json,
 )
-from action_assistant.random_ids import random_id
 from action_assistant.web.auth.roles import Role
 
 FOLDER: Final = "people"
@@ -136,12 +133,9 @@ class PeopleFiles:
         return self._folder / f"{name}.json"
 
     def _replace(self, name: str, content: PersonFile | dict[str, str]) -> None:
-        path = self._path(name)
         try:
-            make_folder(self._folder)
-            keep_damaged(path, PersonFile if isinstance(content, PersonFile) else dict[str, str])
-            part = self._folder / f"{name}.{random_id()}.part"  # the other process may write, too
-            replace_file(path, msgspec.json.encode(content), part=part)
+            kind = PersonFile if isinstance(content, PersonFile) else dict[str, str]
+            write_json(self._path(name), content, kind)
         except OSError as error:
             raise Unavailable(
                 f"It holds here and now, but could not be written to {self._folder}: "

@@ -19,15 +19,7 @@ from typing import Annotated, Final
 import msgspec
 
 from action_assistant.errors import BadInput, Unavailable
-from action_assistant.private_files import (
-    DamagedFile,
-    keep_damaged,
-    log_unreadable,
-    make_folder,
-    read_json,
-    replace_file,
-    sync,
-)
+from action_assistant.private_files import keep_damaged, read_logged, sync, write_json
 from action_assistant.web.auth.keys import PersonRef
 
 log: Final = logging.getLogger(__name__)
@@ -93,9 +85,7 @@ class ReleasedVersions:
         try:
             if path.exists() and _read(path) is not None:
                 return
-            make_folder(self._folder)
-            keep_damaged(path, Release)
-            replace_file(path, msgspec.json.encode(release))
+            write_json(path, release)
             sync(self._folder)
         except OSError as error:
             raise Unavailable(f"The release could not be written: {error.strerror}.") from error
@@ -167,10 +157,8 @@ def _version_of(path: Path) -> str:
 def _read(path: Path) -> Release | None:
     """Return the release in a file; None for a file that is gone, damaged, or about another version."""
     try:
-        found = read_json(path, Release)
+        found = read_logged(path, Release)
     except FileNotFoundError:
         return None
-    except DamagedFile as error:
-        log_unreadable(path, error)
-        return None
-    return found if path.name == f"{found.digest}-{found.version}.json" else None
+    is_here = found is not None and path.name == f"{found.digest}-{found.version}.json"
+    return found if is_here else None

@@ -31,12 +31,12 @@ from action_assistant.errors import (
 from action_assistant.private_files import (
     DamagedFile,
     FileState,
-    keep_damaged,
-    log_unreadable,
     read_json,
+    read_logged,
     replace_file,
     state_of,
     sync,
+    write_json,
 )
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
@@ -339,12 +339,9 @@ class TokenFiles:
         self._known[token] = read
 
     def _read(self, token: str) -> TokenRecord | None:
-        try:
-            record = read_json(self._path(token), TokenRecord)
-        except DamagedFile as error:
-            log_unreadable(self._path(token), error)
-            return None
-        return record if record.id == token and self._is_sealed(record) else None
+        record = read_logged(self._path(token), TokenRecord)
+        is_ours = record is not None and record.id == token and self._is_sealed(record)
+        return record if is_ours else None
 
     def _has_ended(self, record: TokenRecord) -> bool:
         return (
@@ -354,11 +351,9 @@ class TokenFiles:
         )
 
     def _write(self, record: TokenRecord) -> None:
-        path = self._path(record.id)
         try:
             self._folder.mkdir(mode=0o700, exist_ok=True)
-            keep_damaged(path, TokenRecord)
-            replace_file(path, msgspec.json.encode(record), part=path.with_suffix(".part"))
+            write_json(self._path(record.id), record)
             sync(self._folder)
         except OSError as error:
             raise Unavailable(
