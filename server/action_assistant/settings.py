@@ -30,6 +30,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_PUBLIC_URL": "where a proxy shows the page to others, as --public-url",
     "ACTION_ASSISTANT_TRUSTED_PROXIES": "addresses and networks of proxies that are believed about who "
     "asks, as --trusted-proxies",
+    "ACTION_ASSISTANT_RUNNERS": "several runners for one page, as --runner, such as "
+    "`Hall A=http://127.0.0.1:8001;Hall B=http://127.0.0.1:8011` (the one beside the editor)",
     "ACTION_ASSISTANT_RUNNER_PYTHON": "the Python that has rclpy; `serve` runs the runner under it",
     "ACTION_ASSISTANT_KEEP_RUNS": "days after which runs go into archives (for ever)",
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
@@ -74,6 +76,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "direct one fail",
 }
 INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
+RUNNERS: Final = "ACTION_ASSISTANT_RUNNERS"
 #: The variables that name a file with a secret, and the variable that the secret stands for.
 _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
@@ -101,8 +104,8 @@ TOKEN_DAYS: Final = 365.0
 WATCHDOG_S: Final = 60.0
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
-_MIN_TOKEN: Final = 32  # characters, as of the token that programs present
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
+_MIN_TOKEN: Final = 32  # characters, as of the token that programs present
 
 
 class Reachability(msgspec.Struct, frozen=True):
@@ -146,17 +149,26 @@ class RunLink(msgspec.Struct, frozen=True):
     url: str
 
 
+class Site(msgspec.Struct, frozen=True):
+    """A runner of a page that leads several. `name`: for people; `url`: without a slash at its
+    end."""
+
+    name: str
+    url: str
+
+
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
     `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS; `frames`: the origins of sites
     that may show links to one thing in a frame; `run_links`: as in ACTION_ASSISTANT_RUN_LINKS; `oidc`: the values of the variables
-    ACTION_ASSISTANT_OIDC_…"""
+    ACTION_ASSISTANT_OIDC_…; `sites`: the runners of the page, if there are several."""
 
     data: Path
     database: str
     host: str = "127.0.0.1"
     port: int = 8000
     runner_port: int = 8001
+    sites: tuple[Site, ...] = ()
     hosts: tuple[str, ...] = ()
     limits: bool = True
     load: LoadLimits = LoadLimits()

@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -20,8 +20,10 @@ from action_assistant.private_files import opener
 from action_assistant.settings import (
     EVERYWHERE,
     INDEX_FOLDERS,
+    RUNNERS,
     WATCHDOG_S,
     Reachability,
+    Site,
     as_index_folders,
     more_hosts,
 )
@@ -71,6 +73,7 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     behaviours: Path | None = None
     backups: BackupPlan | None = None
     index_folders: Mapping[str, Path] = {}
+    sites: tuple[Site, ...] = ()
     watchdog: float | None = WATCHDOG_S
 
 
@@ -327,7 +330,7 @@ def _children(plan: ServePlan) -> list[Child]:
             ["editor", *address, *switch, "--port", ports[0], "--runner-port", ports[1]],
             plan.port,
             this,
-            {**settings, **database},
+            {**settings, **database, **_as_runners(plan.sites)},
         ),
         Child(
             "runner",
@@ -337,6 +340,10 @@ def _children(plan: ServePlan) -> list[Child]:
             {**settings, INDEX_FOLDERS: as_index_folders(plan.index_folders)},
         ),
     ]
+
+
+def _as_runners(sites: Sequence[Site]) -> dict[str, str]:
+    return {RUNNERS: ";".join(f"{each.name}={each.url}" for each in sites)}
 
 
 def _keeper(plan: ServePlan) -> Child | None:

@@ -55,6 +55,8 @@ LISTED: Final = {
     "action-assistant migrate --back": "needs the data of an older version: tests/commands has some",
     "action-assistant backup --into /backups --data DIR --every": "needs rclone, and a day",
     "action-assistant serve --index-folder": "needs the folders of two robots",
+    "action-assistant serve --runner": "needs a second runner: tests/commands has one",
+    "action-assistant runner --data ./hall-b": "needs the token of a server: tests/commands has one",
     "action-assistant serve --data": "needs a data folder that no server has: tests start hundreds",
     "action-assistant stop --all --server": "speaks to another computer",
     "action-assistant stop --all --url": "speaks to another computer",

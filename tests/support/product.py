@@ -58,6 +58,10 @@ class Product:
         self.log = data.parent / f"{data.name}.log"
         self._process: warm.Process | None = None
 
+    def add_flags(self, *flags: str) -> None:
+        """Give the next start more flags, which may name its ports."""
+        self._flags += flags
+
     @property
     def url(self) -> str:
         """The URL of the editor."""
@@ -157,6 +161,16 @@ class Product:
             text=True,
             timeout=60,
             check=False,
+        )
+
+    def started(self, *arguments: str) -> "subprocess.Popen[str]":
+        """Start a command against this server in a process of its own, without waiting for its end."""
+        return subprocess.Popen(
+            [*self._program, *arguments],
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
         )
 
     def editor(self) -> httpx.Client:

@@ -263,7 +263,7 @@ def _moment(text: str, *, is_end: bool) -> datetime:
 
 
 def _rows(server: Server, query: dict[str, Any]) -> tuple[Iterator[AuditRow], list[str], list[str]]:
-    """Return the rows of both processes, the newest first, and two lists that get sentences: for each
+    """Return the rows of all processes, the newest first, and two lists that get sentences: for each
     process that does not answer, and for each that has dropped old rows. Raise RequestRefused if a
     process refuses the query."""
     away: list[str] = []
@@ -276,12 +276,15 @@ def _rows(server: Server, query: dict[str, Any]) -> tuple[Iterator[AuditRow], li
             away,
             notes,
         ),
-        _log(
-            lambda **asked: server.runner("GET", "/api/audit", **asked),
-            query,
-            "runner",
-            away,
-            notes,
+        *(
+            _log(
+                partial(server.at(site).runner, "GET", "/api/audit"),
+                query,
+                f"runner of {site.name}" if site.name else "runner",
+                away,
+                notes,
+            )
+            for site in server.runners.sites
         ),
     ]
     return heapq.merge(*logs, key=lambda row: row.at, reverse=True), away, notes

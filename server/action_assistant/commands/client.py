@@ -9,6 +9,7 @@ import ssl
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 from urllib.parse import urlsplit
@@ -16,9 +17,12 @@ from urllib.parse import urlsplit
 import msgspec
 
 from action_assistant import paths, settings
+from action_assistant.commands.runners import Runners
 from action_assistant.commands.stored_tokens import StoredToken, stored_token
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.logs import say
+from action_assistant.settings import Site
+from action_assistant.sites import kept_sites, port_of
 from action_assistant.system.served_addresses import ServedAddress, served_address
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.token_text import token_id
@@ -90,11 +94,18 @@ def names_server(options: argparse.Namespace) -> bool:
 
 
 class Server:
-    """A client of a running editor and its runner. `no_editor`: why no request reaches an editor."""
+    """A client of a running editor and its runners. `sites`: all runners, if there are several;
+    `no_editor`: why no request reaches an editor."""
 
-    def __init__(self, editor: "httpx.Client", runner_url: str, no_editor: str = "") -> None:
+    def __init__(
+        self,
+        editor: "httpx.Client",
+        runner_url: str,
+        no_editor: str = "",
+        sites: tuple[Site, ...] = (),
+    ) -> None:
         self._client = editor
-        self._runner_url = runner_url
+        self.runners = Runners(partial(request, editor), sites or (Site("", runner_url),))
         self._no_editor = no_editor
 
     @property
@@ -110,9 +121,13 @@ class Server:
         return request(self._client, method, path, **body)
 
     def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Send a request to the runner, wait for the answer and return it. `body`: further
-        arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
-        return request(self._client, method, self._runner_url + path, **body)
+        """Send a request to the runner that it is meant for, wait for the answer and return it.
+        `body`: further arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
+        return self.runners.request(method, path, **body)
+
+    def at(self, site: Site) -> "Server":
+        """Return a client of the editor and the runner of one site."""
+        return Server(self._client, site.url, self._no_editor, (site,))
 
     def graph_id(self, asked: str) -> str:
         """Return the id of the graph with the id or name `asked`. Raise RequestRefused unless
@@ -240,45 +255,61 @@ def running(options: argparse.Namespace, *, without_editor: bool = False) -> Ite
     import httpx
 
     found = _found(options, _trust(options))
-    with httpx.Client(**_reach(options, found)) as client:
-        runner = found.runner or _runner_url(client, options, found, without_editor=without_editor)
-        yield Server(client, runner, found.no_editor)
+    reached = _reach(options, found)
+    with httpx.Client(**reached) as client:
+        if found.runner is not None:
+            runner = found.runner
+            first, *others = kept_sites(options.data.resolve()) or (Site("", runner),)
+            sites = (Site(first.name, runner), *others)
+        else:
+            runner, sites = _runner_urls(client, options, found, without_editor=without_editor)
+        reached["auth"].named |= {each.url for each in sites if port_of(each) is None}
+        yield Server(client, runner, found.no_editor, sites)
 
 
-def _runner_url(
+def _runner_urls(
     client: "httpx.Client", options: argparse.Namespace, found: _Found, *, without_editor: bool
-) -> str:
-    """Return the URL of the runner. With a token that has expired the editor does not say it, and the
-    one that was known at the login counts: such a token may still stop."""
+) -> tuple[str, tuple[Site, ...]]:
+    """Return the URL of the runner, and all sites if there are several. With a token that has expired
+    the editor does not say them, and those known at the login count: such a token may still stop."""
     patience = {"timeout": _EDITOR_S} if without_editor else {}
     try:
-        url: str = request(client, "GET", "/api/config", **patience).json()["runner_url"]
+        config = decoded(request(client, "GET", "/api/config", **patience), RunnerUrls)
     except RequestRefused as refusal:
         stored = _stored(str(client.base_url))
         if refusal.status != 401 or stored is None or not stored.runner_url:
             raise
-        return stored.runner_url
+        return stored.runner_url, stored.runners
     except CannotStart:
         beside = _runner_beside(client.base_url, options, found) if without_editor else None
         if beside is None:
             raise
         return beside
-    return url
+    return config.runner_url, config.runners
 
 
-def _runner_beside(editor: "httpx.URL", options: argparse.Namespace, found: _Found) -> str | None:
-    """Return the URL of the runner beside an editor that does not answer: the one that was known at
+class RunnerUrls(msgspec.Struct, frozen=True):
+    """The part of the editor's configuration that says where the runners are."""
+
+    runner_url: str
+    runners: tuple[Site, ...] = ()
+
+
+def _runner_beside(
+    editor: "httpx.URL", options: argparse.Namespace, found: _Found
+) -> tuple[str, tuple[Site, ...]] | None:
+    """Return the URL of the runner, and all sites if there are several, beside an editor that does not answer: the one that was known at
     the login, else the port after the editor's. Return None for an editor without a port in its
     URL, as behind a proxy, where nobody has signed in."""
     stored = _stored(str(editor))
     if stored is not None and stored.runner_url:
-        return stored.runner_url
+        return stored.runner_url, stored.runners
     if editor.port is None:
         return None
     url = editor.copy_with(port=editor.port + 1)
     if found.supposed:  # no editor was there to tell whether it speaks TLS
         url = url.copy_with(scheme=_scheme(editor.port + 1, _trust(options)))
-    return str(url).rstrip("/")
+    return str(url).rstrip("/"), ()
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:

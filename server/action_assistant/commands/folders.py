@@ -115,7 +115,7 @@ def tell_runner_rules(server: Server) -> None:
     if rules["at"] == 0:
         return
     try:
-        server.runner("PUT", "/api/graph-rules", json=rules)
+        server.runners.tell("PUT", "/api/graph-rules", json=rules)
     except (RequestRefused, CannotStart) as error:
         raise RequestRefused(
             f"Done, but a runner with a data folder of its own has not been told: {error}"

@@ -13,6 +13,7 @@ import msgspec
 
 from action_assistant import paths
 from action_assistant.commands.client import (
+    RunnerUrls,
     Server,
     command,
     decoded,
@@ -166,11 +167,12 @@ def _keep(client: "httpx.Client", url: str, granted: "Claimed") -> None:
     except CannotStart:
         _end_at(client, "", record.id, made.token)
         raise
-    runner = ""
     if "read" in record.scopes:
-        runner = request(client, "GET", "/api/config", headers=bearer).json()["runner_url"]
-        store(msgspec.structs.replace(kept, runner_url=runner))
-        _tell_runner(client, runner, record)
+        urls = decoded(request(client, "GET", "/api/config", headers=bearer), RunnerUrls)
+        kept = msgspec.structs.replace(kept, runner_url=urls.runner_url, runners=urls.runners)
+        store(kept)
+        for runner in _runners(kept):
+            _tell_runner(client, runner, record)
     if before is not None:
         _end_before(client, before)
     print(
@@ -189,11 +191,17 @@ def _before(url: str) -> StoredToken | None:
         return None
 
 
+def _runners(token: StoredToken) -> list[str]:
+    """Return the URLs of all runners at which a stored token may be known."""
+    urls = (token.runner_url, *(each.url for each in token.runners))
+    return [url for url in dict.fromkeys(urls) if url]
+
+
 def _end_before(client: "httpx.Client", before: StoredToken) -> None:
     """Revoke the token of the login before, as far as the server still knows it."""
     from action_assistant.web.auth.token_text import token_id
 
-    for where in dict.fromkeys(("", before.runner_url)):
+    for where in ("", *_runners(before)):
         try:
             _end_at(client, where, token_id(before.token) or "none", before.token)
         except (RequestRefused, CannotStart) as error:
@@ -236,7 +244,7 @@ def _logout(options: argparse.Namespace) -> int:
         raise RequestRefused(f"No token is stored for {url}.")
     with _client(url, options) as client:
         try:
-            for where in dict.fromkeys(("", kept.runner_url)):
+            for where in ("", *_runners(kept)):
                 _end_at(client, where, token_id(kept.token) or "none", kept.token)
         except (RequestRefused, CannotStart) as error:
             if not options.forget:
@@ -295,7 +303,7 @@ def _make(options: argparse.Namespace) -> int:
         made = decoded(server.editor("POST", "/api/tokens", json=wanted), MadeToken)
         print(made.token)
         try:
-            server.runner(
+            server.runners.tell(
                 "POST", "/api/tokens/records", json={"record": msgspec.to_builtins(made.record)}
             )
         except (RequestRefused, CannotStart) as error:
@@ -317,15 +325,10 @@ def _revoke(options: argparse.Namespace) -> int:
 
 
 def _revoke_at_runner(server: Server, path: str) -> None:
-    """Revoke a token in a runner with a data folder of its own; elsewhere it is gone already."""
+    """Revoke a token in runners with a data folder of their own; elsewhere it is gone already."""
     try:
-        server.runner("POST", path)
-    except RequestRefused as error:
-        if error.status != 404:
-            raise RequestRefused(
-                f"Revoked at the editor, but not at the runner: {error}"
-            ) from error
-    except CannotStart as error:
+        server.runners.tell("POST", path, gone=frozenset({404}))
+    except (RequestRefused, CannotStart) as error:
         raise RequestRefused(f"Revoked at the editor, but not at the runner: {error}") from error
 
 

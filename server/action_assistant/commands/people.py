@@ -195,7 +195,7 @@ def _tell_runner(server: Server, person: "Member") -> None:
     until = None if person.until is None else person.until.timestamp()
     file = PersonFile(person.id, person.name, person.role, person.groups, until)
     try:
-        server.runner("PUT", f"/api/members/{person.id}", json=msgspec.to_builtins(file))
+        server.runners.tell("PUT", f"/api/members/{person.id}", json=msgspec.to_builtins(file))
     except (RequestRefused, CannotStart) as error:
         raise RequestRefused(
             f"Done, but a runner with a data folder of its own has not been told: {error}"
@@ -217,7 +217,7 @@ def _end_person(options: argparse.Namespace) -> int:
             person = meant[0].id
             server.editor("POST", f"/api/members/{person}/end")
             try:
-                server.runner("POST", "/api/revocations", json={"person": person})
+                server.runners.tell("POST", "/api/revocations", json={"person": person})
             except (RequestRefused, CannotStart) as error:
                 raise RequestRefused(
                     f"Ended, but a runner with a data folder of its own has not been told: {error}"
@@ -334,7 +334,7 @@ def _revoke(options: argparse.Namespace) -> int:
 def _revoke_at(server: Server, invitation: str) -> int:
     answer = server.editor("POST", f"/api/invitations/{invitation}/revoke")
     try:
-        server.runner("POST", "/api/revocations", json={"invitation": invitation})
+        server.runners.tell("POST", "/api/revocations", json={"invitation": invitation})
     except (RequestRefused, CannotStart) as error:
         raise RequestRefused(
             f"Revoked, but a runner with a data folder of its own has not been told: {error}"

@@ -2,6 +2,7 @@
 
 import argparse
 import gc
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -9,6 +10,8 @@ from action_assistant import paths, settings
 from action_assistant.commands.backups.options import add_rules, span
 from action_assistant.errors import CannotStart
 from action_assistant.logs import FORMS, LEVELS, hand_on, log_settings, set_up
+from action_assistant.settings import Site
+from action_assistant.sites import keep_sites, sites
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.supervisor import BackupPlan
@@ -30,6 +33,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     _behaviours(parser)
     _backups(parser)
     _index_folders(parser)
+    _runners(parser)
     _logging(parser)
 
 
@@ -38,6 +42,7 @@ def _add_editor(editor: argparse.ArgumentParser) -> None:
     _address(editor, port=settings.port())
     _database(editor, switch=True)
     _sharing(editor)
+    _runners(editor)
     _logging(editor)
     editor.add_argument(
         "--runner-port", type=settings.port_number, metavar="N", help="default: the next port"
@@ -161,6 +166,18 @@ def _index_folders(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _runners(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--runner",
+        dest="runners",
+        action="append",
+        default=[],
+        metavar="NAME=URL",
+        help="of each runner of a page with several: first the one beside the editor, then the others, "
+        "which are started by themselves with the same token. May be given several times",
+    )
+
+
 def _logging(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--log-format", choices=FORMS, help="how lines of the log look; default: console"
@@ -218,16 +235,28 @@ def _secrets(data: Path) -> tuple[str, ...]:
     return Keys.of(data).token, settings.metrics_token() or "", secret
 
 
+def sites_of(options: argparse.Namespace, runner_port: int) -> tuple[Site, ...]:
+    """Return the runners of a page with several. Raise CannotStart if one cannot be used."""
+    return sites(
+        options.runners or os.environ.get(settings.RUNNERS, "").split(";"),
+        runner_port=runner_port,
+        public=reached(options).public,
+        tls=options.tls,
+    )
+
+
 def _editor_settings(options: argparse.Namespace, data: Path) -> settings.EditorSettings:
     from action_assistant.editor.log.database_location import to_serve
 
     switch = options.switch_database
+    runner_port = options.runner_port or options.port + 1
     return settings.EditorSettings(
         data=data,
         database=options.database or to_serve(data, switch=switch),
         host=_host(options),
         port=options.port,
-        runner_port=options.runner_port or options.port + 1,
+        runner_port=runner_port,
+        sites=sites_of(options, runner_port),
         hosts=settings.more_hosts(),
         limits=settings.limits(),
         load=settings.load_limits(),
@@ -267,6 +296,7 @@ def _serve(options: argparse.Namespace) -> int:
             reached=reached(options),
             behaviours=options.behaviours,
             index_folders=settings.index_folders(options.index_folder),
+            sites=sites_of(options, options.port + 1),
             opens=not options.no_open,
             backups=_backup_plan(options),
             watchdog=settings.watchdog(),
@@ -298,6 +328,7 @@ def _editor(options: argparse.Namespace) -> int:
     data = settings.data_folder(options.data.resolve())
     _log("editor", options, *_secrets(data))
     chosen = _editor_settings(options, data)
+    keep_sites(data, chosen.sites)
     listen(
         lambda: create_app(chosen),
         host=chosen.host,

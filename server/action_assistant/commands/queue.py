@@ -77,12 +77,17 @@ def _add_queue(queue: argparse.ArgumentParser) -> None:
 
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
-        queue = server.runner("GET", "/api/queue").json()
+        found = server.runners.gathered("/api/queue")
+    queues = [(site, answer.json()) for site, answer in found.answers]
     if options.json:
-        print_json(queue)
-        return 0
-    _print(queue)
-    return 0
+        only = queues[0][1] if not queues[0][0].name else None
+        print_json(only or {each.name: queue for each, queue in queues})
+        return found.code
+    for site, queue in queues:
+        if site.name:
+            print(one_line(f"{site.name}:"))
+        _print(queue)
+    return found.code
 
 
 def _print(queue: "Mapping[str, Any]") -> None:
@@ -145,7 +150,8 @@ def _close(options: argparse.Namespace) -> int:
 
 def _open(options: argparse.Namespace) -> int:
     path = f"/api/queue/robots/{options.robot}"
-    with running(options) as server:
+    with running(options) as found:
+        server = found.at(found.runners.of_robot(options.robot))
         queue = server.runner("GET", "/api/queue").json()
         robot = next((each for each in queue["robots"] if each["robot"] == options.robot), None)
         if robot is None:

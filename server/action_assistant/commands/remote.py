@@ -5,9 +5,10 @@ import sys
 import time
 import uuid
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 import msgspec
 
@@ -32,6 +33,7 @@ _TIME: Final = "%Y-%m-%dT%H:%M:%S"
 _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
 _NOBODY_ANSWERS: Final = frozenset({502, 503, 504})  # statuses of a proxy that reaches nobody
+_NOT_FOUND: Final = 404
 _STOP_ANSWER_S: Final = 10.0  # after which a runner that is silent about a Stop is called silent
 _LOOK_AT_ROBOT: Final = "Look at the robot; use its hardware stop."
 
@@ -281,8 +283,8 @@ def _release(options: argparse.Namespace) -> int:
             "digest": version.get("tree_digest") or version["digest"],
             **version.get("released", {}),
         }
-        body = {} if options.withdraw else {"json": release}
-        server.runner(method, f"/api/releases/{id_}", **body)
+        body = None if options.withdraw else release
+        server.runners.tell(method, f"/api/releases/{id_}", json=body)
     name = version["label"] or id_
     print(one_line(f"{name} is {'not released any more' if options.withdraw else 'released'}"))
     return 0
@@ -518,40 +520,93 @@ def insisting(server: Server, method: str, path: str) -> Any:
         time.sleep(_POLL)
 
 
+class _Stopped(NamedTuple):
+    """The outcome of a Stop: sentences about what is in doubt, and about what is at rest."""
+
+    doubts: Sequence[str]
+    ends: Sequence[str]
+
+    def print(self, place: str = "") -> None:
+        """Print the doubts as errors, then the rest; `place` stands before each line."""
+        for said in self.doubts:
+            print(one_line(place + said), file=sys.stderr, flush=True)
+        for said in dict.fromkeys(self.ends):
+            print(one_line(place + said), flush=True)
+
+
 def _stop(options: argparse.Namespace) -> int:
     """Request a Stop of one run or of everything. Wait until nothing moves or a Stop is
     unconfirmed, for `options.wait` seconds at most; print each doubt that is left. Return 0 if
     nothing is in doubt, else 1. Raise RequestRefused if the Stop is refused, CannotStart if the
     server does not answer."""
     with _reached_for_stop(options) as server:
-        path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
-        asked = _sent(server, path)
-        with _following():
-            others = asked.get("graphs", {})
-            is_over = not asked["runs"] and not options.all
-            ids = [options.run] if is_over and _is_run(server, options.run) else asked["runs"]
-            deadline = time.monotonic() + options.wait
-            while True:
-                runs = [insisting(server, "GET", f"/api/runs/{run}") for run in ids]
-                robots = insisting(server, "GET", "/api/robots") if others else []
-                graphs = _unproven(others, robots)
-                settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
-                if (settled and not graphs) or time.monotonic() > deadline:
-                    break
-                time.sleep(_POLL)
+        if server.runners.has_several:
+            return _stop_at_sites(server, options)
+        stopped = _stopped(server, options)
+    stopped.print()
+    return 1 if stopped.doubts else 0
+
+
+def _stop_at_sites(server: Server, options: argparse.Namespace) -> int:
+    """Stop at all sites at once, and print what each says as soon as it does, so that one that hangs
+    delays no other. The site of a single run is not known, so all are asked, and only those that have
+    it count. Raise the error of a site if no site has the run."""
+    failed: dict[str, RequestRefused | CannotStart] = {}
+    doubts = found = 0
+    with ThreadPoolExecutor(len(server.runners.sites)) as pool:
+        asked = {
+            pool.submit(_stopped, server.at(site), options): site for site in server.runners.sites
+        }
+        for each in as_completed(asked):
+            name = asked[each].name
+            try:
+                stopped = each.result()
+            except (RequestRefused, CannotStart) as error:
+                failed[name] = error
+                if options.all:
+                    _Stopped([str(error)], ()).print(f"{name}: ")
+                continue
+            found += 1
+            doubts += len(stopped.doubts)
+            stopped.print(f"{name}: ")
+    if options.all or found:
+        return 1 if doubts or (options.all and failed) else 0
+    silent = {name: error for name, error in failed.items() if _is_silent(error)}
+    said = " ".join(f"{name}: {error}" for name, error in (silent or failed).items())
+    raise CannotStart(said) if silent else RequestRefused(said)
+
+
+def _is_silent(error: RequestRefused | CannotStart) -> bool:
+    """Return whether a site may have a run although it answered a Stop of it with an error."""
+    return isinstance(error, CannotStart) or error.status != _NOT_FOUND
+
+
+def _stopped(server: Server, options: argparse.Namespace) -> _Stopped:
+    """Stop at one runner, and follow what becomes of it as `_stop` says."""
+    path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
+    asked = _sent(server, path)
+    with _following():
+        others = asked.get("graphs", {})
+        is_over = not asked["runs"] and not options.all
+        ids = [options.run] if is_over and _is_run(server, options.run) else asked["runs"]
+        deadline = time.monotonic() + options.wait
+        while True:
+            runs = [insisting(server, "GET", f"/api/runs/{run}") for run in ids]
+            robots = insisting(server, "GET", "/api/robots") if others else []
+            graphs = _unproven(others, robots)
+            settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
+            if (settled and not graphs) or time.monotonic() > deadline:
+                break
+            time.sleep(_POLL)
     doubts = [_unconfirmed(run) for run in runs if not _is_at_rest(run)]
     doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK_AT_ROBOT}" for each in graphs]
     doubts += [
         f"NOT KNOWN what {each} runs: {why}" for each, why in asked.get("unknown", {}).items()
     ]
-    for said in doubts:
-        print(one_line(said), file=sys.stderr)
     ends = [stopped_as(run, was_over=is_over) for run in runs if _is_at_rest(run)]
     if not doubts:
         ends = ends or ["stopped" if others else "nothing was running"]
-    for said in dict.fromkeys(ends):
-        print(one_line(said))
-    return 1 if doubts else 0
+    return _Stopped(doubts, ends)
 
 
 @contextmanager

@@ -58,6 +58,11 @@ def _add_robots(robots: argparse.ArgumentParser) -> None:
         help="the runner may lead it step by step, in runs that several robots share",
     )
     add.add_argument(
+        "--site",
+        metavar="NAME",
+        help="of several runners, the one that leads it; default: the first",
+    )
+    add.add_argument(
         "--replace", action="store_true", help="register it anew, if it is registered already"
     )
     add.set_defaults(handler=_add)
@@ -231,15 +236,17 @@ COMMANDS: Final = {"robots": _add_robots}
 
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
-        answer = server.runner("GET", "/api/robots")
+        found = server.runners.gathered("/api/robots")
     if options.json:
-        print_json(answer.json())
-        return 0
+        print_json(found.json())
+        return found.code
     from action_assistant.runner.robots.registration import Robot
 
-    for each in decoded(answer, list[Robot]):
-        print(_line(each))
-    return 0
+    for site, answer in found.answers:
+        at = f"  {one_line(site.name)}" if site.name else ""
+        for each in decoded(answer, list[Robot]):
+            print(_line(each) + at)
+    return found.code
 
 
 def _add(options: argparse.Namespace) -> int:
@@ -253,9 +260,12 @@ def _add(options: argparse.Namespace) -> int:
         wanted["rmw"] = options.rmw
     if options.get_service is not None:
         wanted["get_service"] = options.get_service
-    with running(options) as server:
+    with running(options) as lab:
         from action_assistant.runner.robots.registration import Robot
 
+        site = lab.runners.named(options.site)
+        lab.runners.robots_elsewhere(options.name, site)
+        server = lab.at(site)
         robots = decoded(server.runner("GET", "/api/robots"), list[Robot])
         if options.name in {each.name for each in robots} and not options.replace:
             raise RequestRefused(
@@ -510,7 +520,8 @@ def _take_baton(options: argparse.Namespace) -> int:
 
 
 def _hand_baton(options: argparse.Namespace) -> int:
-    with running(options) as server:
+    with running(options) as lab:
+        server = lab.at(lab.runners.of_robot(options.name))
         here = server.runner("GET", "/api/rights").json()["people"]
         found = [each for each in here if options.to in {each["id"], each["name"]}]
         if len(found) != 1:

@@ -4,6 +4,7 @@ import argparse
 import asyncio
 import sys
 from collections.abc import Iterator
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -181,17 +182,24 @@ def _wait(options: argparse.Namespace) -> int:
 def _runs(options: argparse.Namespace) -> int:
     with running(options) as server:
         query = {"graph": server.graph_id(options.graph)} if options.graph else {}
-        answer = server.runner("GET", "/api/runs", params=query)
+        found = server.runners.gathered("/api/runs", params=query)
     if options.json:
-        print_json(answer.json())
-        return 0
+        listed = found.json()
+        if len(found.answers) > 1:
+            listed.sort(key=lambda run: datetime.fromisoformat(run["requested_at"]), reverse=True)
+        print_json(listed)
+        return found.code
     from action_assistant.runner.runs.views import Listed
 
-    for run in decoded(answer, list[Listed]):
+    rows = [(run, at) for at, answer in found.answers for run in decoded(answer, list[Listed])]
+    if len(found.answers) > 1:
+        rows.sort(key=lambda row: row[0].requested_at, reverse=True)
+    for run, site in rows:
         what = run.state + (f" ({run.result})" if run.result else "")
         when = f"{run.started_at:{_TIME}}" if run.started_at else ""
-        print(one_line(f"{run.id}  {when}  {run.graph_name}  {run.engine}  {what}"))
-    return 0
+        at = f"  {site.name}" if site.name else ""
+        print(one_line(f"{run.id}  {when}  {run.graph_name}  {run.engine}  {what}{at}"))
+    return found.code
 
 
 def _at_rest(options: argparse.Namespace) -> int:
@@ -407,7 +415,8 @@ def _archive(options: argparse.Namespace) -> int:
     if options.runs is None and options.raw is None:
         raise CannotStart("Say how old what goes may be: --runs DAYS, --raw DAYS, or both.")
     with running(options) as server:
-        return _sweep(server, {"runs": options.runs, "raw": options.raw})
+        ages = {"runs": options.runs, "raw": options.raw}
+        return max(_sweep(server.at(site), ages) for site in server.runners.sites)
 
 
 def _sweep(server: Server, ages: dict[str, float | None]) -> int:

@@ -12,13 +12,14 @@ import msgspec
 from action_assistant import paths
 from action_assistant.errors import CannotStart
 from action_assistant.private_files import DamagedFile, make_folder, read_json, replace_file
+from action_assistant.settings import Site
 
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 
 class StoredToken(msgspec.Struct, frozen=True):
     """A token for one server. `url`: of the editor, as `server_key` writes it. `runner_url`: where
-    the runner was at the login; "" if unknown. `name`: of the token. `expires`: seconds since
+    the runner was at the login; "" if unknown. `runners`: all of them, if there were several. `name`: of the token. `expires`: seconds since
     1970.
     """
 
@@ -28,6 +29,7 @@ class StoredToken(msgspec.Struct, frozen=True):
     scopes: tuple[str, ...]
     expires: float
     runner_url: str = ""
+    runners: tuple[Site, ...] = ()
 
 
 def server_key(url: str) -> str:

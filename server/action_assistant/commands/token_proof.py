@@ -34,6 +34,8 @@ class AfterProof(httpx.Auth):
         self._stored = stored
         self._supposed = supposed
         self._proven: dict[str, str] = {}
+        #: Addresses that our server or its owner has named, such as those behind a proxy.
+        self.named: set[str] = set()
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
         """Yield a request with a token added, as httpx demands. Before the first request to a
@@ -44,7 +46,9 @@ class AfterProof(httpx.Auth):
             challenge = secrets.token_urlsafe(32)
             url = f"{base}{_API}server?challenge={challenge}{self._named()}"
             answer = yield httpx.Request("GET", url, extensions=request.extensions)
-            known = self._known_to(challenge, answer)
+            known = self._known_to(
+                challenge, answer, supposed=self._supposed and base not in self.named
+            )
             if known is None:
                 raise CannotStart(_why(base, self._stored, supposed=self._supposed))
             self._proven[base] = known
@@ -55,13 +59,13 @@ class AfterProof(httpx.Auth):
         """Return the part of the query that asks for a proof of the stored token."""
         return "" if self._stored is None else f"&token={token_id(self._stored.token)}"
 
-    def _known_to(self, challenge: str, answer: httpx.Response) -> str | None:
+    def _known_to(self, challenge: str, answer: httpx.Response, *, supposed: bool) -> str | None:
         """Return the token that the server has proven to know; None if there is none."""
         try:
             given = msgspec.json.decode(answer.content, type=ServerProof)
         except (ValueError, RecursionError):
             return None
-        at = _peer(answer) if self._supposed else None
+        at = _peer(answer) if supposed else None
         if self._keys is not None and self._keys.proven(challenge, given, at=at):
             return self._keys.token
         stored = self._stored

@@ -48,6 +48,7 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
+from action_assistant.sites import port_of
 from action_assistant.web.audit.events import KEEPING, AuditKept, draft_of
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.audit.retention import AuditRetention, kept_for_incidents
@@ -229,6 +230,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         page=paths.page(),
         help_site=paths.help_site(),
         runner_port=settings.runner_port,
+        more_runners=[port for each in settings.sites[1:] if (port := port_of(each)) is not None],
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,
     )

@@ -149,12 +149,13 @@ def test_every_option_of_serve_reaches_it_or_has_a_reason_not_to() -> None:
         "database": "one with a password is refused",
         "switch_database": "it is meant for one start",
         "index_folder": "there may be several",
+        "runners": "the same",
         "backup_to": "backups have a rule of their own",
         "backup_every": "the same",
         "backup_keep": "the same",
         "backup_after": "the same",
     }
-    apart = {"index_folder", "backup_to", "backup_every", "backup_keep", "backup_after"}
+    apart = {"index_folder", "runners", "backup_to", "backup_every", "backup_keep", "backup_after"}
     assert known == {*_VALUES, *_FLAGS, *left_out, *apart}
 
 
@@ -203,3 +204,9 @@ def test_without_systemd_it_says_so_and_still_shows_the_unit(
     assert list(tmp_path.iterdir()) == []
     assert main(["service", "install", "--user", "--print"]) == 0
     assert is_untouched(capsys.readouterr().out)
+
+
+def test_the_service_leads_the_named_runners(service: Service, unit: Path) -> None:
+    words = ("--runner", "Hall A=http://127.0.0.1:8001", "--runner", "Hall B=http://127.0.0.1:8011")
+    assert service("install", "--as", "robot", *words) == 0
+    assert "'Hall B=http://127.0.0.1:8011'" in unit.read_text().replace('"', "'")

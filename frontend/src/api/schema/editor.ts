@@ -383,6 +383,7 @@ export interface EditorApi {
      * Config
      * @description The settings that a page asks for first. `runner_url` has no slash at its end. `commit`: the commit of
      *     this program, null where it is unknown. `run_links`: from runs to what other programs recorded of them.
+     *     `runners`: all of them, if there are several; the first is at `runner_url`.
      */
     Config: {
         mode: string;
@@ -390,6 +391,7 @@ export interface EditorApi {
         runner_url: string;
         commit: string | null;
         run_links: EditorApi["RunLink"][];
+        runners?: EditorApi["Site"][];
     };
     /**
      * ConfirmLogin
@@ -2378,6 +2380,15 @@ export interface EditorApi {
         exact: boolean;
         looked: number;
         partings: EditorApi["CourseChange"][];
+    };
+    /**
+     * Site
+     * @description One of several runners that one page leads. `name`: for people; `url`: without a slash at its
+     *     end.
+     */
+    Site: {
+        name: string;
+        url: string;
     };
     /**
      * Statement

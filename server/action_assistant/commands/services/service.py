@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from action_assistant import paths, settings
-from action_assistant.commands.processes import add_serve_options, reached
+from action_assistant.commands.processes import add_serve_options, reached, sites_of
 from action_assistant.commands.services.unit import (
     NAME,
     SOURCED,
@@ -200,6 +200,9 @@ def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
             words += [f"--{name.replace('_', '-')}", str(shown)]
     for robot, folder in settings.index_folders(options.index_folder, {}).items():
         words += ["--index-folder", f"{robot}={folder}"]
+    sites_of(options, options.port + 1)  # refuses one that cannot be used
+    for text in options.runners:
+        words += ["--runner", text]
     words += _backups(options)
     words += [f"--{name}" for name in _FLAGS if getattr(options, name)]
     user = _user(options) if options.scope == "system" else ""

@@ -18,7 +18,7 @@ from action_assistant.editor.log.inbox_events import inbox_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
-from action_assistant.settings import RunLink
+from action_assistant.settings import RunLink, Site
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
 from action_assistant.web.audit.events import is_audit
@@ -34,13 +34,15 @@ _SILENCE: Final = 10.0  # seconds of silence after which a sign of life is sent
 
 class Config(msgspec.Struct, frozen=True):
     """The settings that a page asks for first. `runner_url` has no slash at its end. `commit`: the commit of
-    this program, null where it is unknown. `run_links`: from runs to what other programs recorded of them."""
+    this program, null where it is unknown. `run_links`: from runs to what other programs recorded of them.
+    `runners`: all of them, if there are several; the first is at `runner_url`."""
 
     mode: str
     version: str
     runner_url: str
     commit: str | None = None
     run_links: tuple[RunLink, ...] = ()
+    runners: tuple[Site, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -86,8 +88,10 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
     )
     async def get_config(request: Request[Any, Any, Any]) -> Config:
         settings = app_state.services.settings
-        runner = addresses.runner_at(request.headers.get("host", ""), settings.runner_port)
-        return Config("local", VERSION, runner, known, settings.run_links)
+        host = request.headers.get("host", "")
+        runner = addresses.runner_at(host, settings.runner_port)
+        runners = addresses.sites_at(host, settings.sites) or msgspec.UNSET
+        return Config("local", VERSION, runner, known, settings.run_links, runners)
 
     @get(
         "/api/people",

@@ -10,7 +10,8 @@ from urllib.parse import urlsplit
 import ifaddr
 
 from action_assistant.public_url import PublicUrl
-from action_assistant.settings import EVERYWHERE, LOOPBACK
+from action_assistant.settings import EVERYWHERE, LOOPBACK, Site
+from action_assistant.sites import port_of
 
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::", EVERYWHERE})
 _LOOK_AGAIN_S: Final = 5.0
@@ -146,6 +147,13 @@ class Addresses:
         header. `port`: the port of the runner, if no proxy stands between."""
         public = self.public_at(header)
         return public.runner if public is not None else self.direct(header, port)
+
+    def sites_at(self, header: str, sites: Iterable[Site]) -> tuple[Site, ...]:
+        """Return the sites with their URLs for a client that sent this Host header."""
+        return tuple(
+            site if (port := port_of(site)) is None else Site(site.name, self.direct(header, port))
+            for site in sites
+        )
 
     def direct(self, header: str, port: int) -> str:
         """Return the URL of a port of this computer under the host name of a Host header, without a

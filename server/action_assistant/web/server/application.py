@@ -68,6 +68,7 @@ def application(
     page: Path | None = None,
     help_site: Path | None = None,
     runner_port: int | None = None,
+    more_runners: Sequence[int] = (),
     mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
@@ -76,7 +77,7 @@ def application(
     origins that may call it; `lifespan`: contexts for as long as it runs. `body_limit`: bytes of a
     request body, unless a route has its own limit. `page`, `help_site`, `runner_port`: only for the
     editor, which serves the built page and the documentation, and names the runner in the
-    Content-Security-Policy. `mount`: the path at which a proxy serves this process. `scraped`: the
+    Content-Security-Policy; `more_runners`: the ports of further ones on this computer. `mount`: the path at which a proxy serves this process. `scraped`: the
     token that allows /metrics only. `tokens`: the tokens of programs; `views`: the links that show
     one thing, `frames`: the origins of sites that may show these in a frame. `standings`: knows
     what sessions and tokens are worth now. Raise CannotStart if a route declares no right."""
@@ -86,6 +87,7 @@ def application(
         _proving(keys, tokens or NoTokens()),
         *([misrouted(runner_port)] if runner_port is not None else []),
     ]
+    runner_ports = () if runner_port is None else (runner_port, *more_runners)
     openapi = OpenApiText()
     inner = _routed(handlers, title, lifespan, body_limit, openapi)
     rights = _declared_rights(inner)
@@ -104,7 +106,7 @@ def application(
         page_port=page_port,
         is_open=lambda path, html: path in rights.open_paths or is_public(path, html),
         policy=lambda host, path: _policy(
-            addresses, host, page_port, runner_port, frames if path == VIEW else ()
+            addresses, host, page_port, runner_ports, frames if path == VIEW else ()
         ),
         revoked=revoked,
         is_of_link=rights.link_paths.__contains__,
@@ -225,15 +227,20 @@ class _Described:
 
 
 def _policy(
-    addresses: Addresses, host: str, page_port: int, runner_port: int | None, frames: Sequence[str]
+    addresses: Addresses,
+    host: str,
+    page_port: int,
+    runner_ports: Sequence[int],
+    frames: Sequence[str],
 ) -> str:
     connect = "'self'"
     public = addresses.public_at(host)
-    if runner_port is not None and public is not None:
+    if runner_ports and public is not None:
         connect += f" {_socket(public.origin)}"  # for older browsers it is not part of 'self'
-    elif runner_port is not None and host_name(host):
-        page, runner = (addresses.direct(host, port) for port in (page_port, runner_port))
-        connect += f" {_socket(page)} {runner} {_socket(runner)}"
+    elif runner_ports and host_name(host):
+        connect += f" {_socket(addresses.direct(host, page_port))}"
+        runners = (addresses.direct(host, port) for port in runner_ports)
+        connect += "".join(f" {runner} {_socket(runner)}" for runner in runners)
     none = "'none'"
     return (
         "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
