@@ -37,8 +37,8 @@ MANY: Final[dict[str, dict[str, Any]]] = {
 
 def tables() -> Iterator[Table]:
     """Rounds; loads; many people. A cell has our figure, then that of Hocuspocus."""
-    rounds = ("cost", "ratio", "p50", "p99", "missing")
-    loads = ("cost", "ratio", "CPU", "p50", "p99", "missing", "memory")
+    rounds = ("cost", "ratio", "p50", "p99")
+    loads = ("cost", "ratio", "CPU", "p50", "p99", "memory")
     yield Table(_head("in rounds", rounds), list(_rows("lockstep", LOCKSTEP, RUNS, rounds)))
     yield Table(_head("load", loads), list(_rows("fan out", OPEN, RUNS, loads)))
     yield Table(_head("load", loads), list(_rows("fan out", MANY, RUNS, loads)))
@@ -66,7 +66,7 @@ def _rows(
     operation: str, loads: dict[str, dict[str, Any]], count: int, figures: Sequence[str]
 ) -> Iterator[list[str]]:
     """Yield one row for each load. The ratio is that of two runs in turn, with the least and the most;
-    of missing edits the sum is given, of all other figures the median."""
+    all other figures are medians. Edits that did not arrive are named beside the load."""
     for load, plan in loads.items():
         found = in_turn(operation, plan, count)
         ratios = [
@@ -79,13 +79,14 @@ def _rows(
             if name != "ratio"
         }
         cells["ratio"] = f"{statistics.median(ratios):.2f} ({min(ratios):.2f}–{max(ratios):.2f})"
+        lost = [sum(run["missing"] for run in runs) for runs in found.values()]
+        if any(lost):
+            load = f"{load}; missing: {lost[0]} / {lost[1]}"
         yield [load, *(cells[name] for name in figures)]
 
 
 def _figure(runs: Sequence[Run], name: str) -> str:
     """Return one figure of the runs of one server, without its unit."""
-    if name == "missing":
-        return str(sum(run["missing"] for run in runs))
     if name == "CPU":
         return f"{median(runs, 'cpu_share') * 100:.0f}"
     if name == "memory":
