@@ -101,6 +101,12 @@ PARTS: Final[dict[str, Part]] = {
         {"SOAK_STOPS": "100"},
         ("tests/journal/test_postgres.py", "-k", "immediate_stops"),
     ),
+    "failover": Part(
+        "6 failovers of two Postgres servers under Patroni, by lost power and by a frozen server, under the load "
+        "of a journal and of an editor with people",
+        {"SOAK_FAILOVERS": "6", "TEST_LONG": "1"},
+        ("-s", "tests/journal/test_patroni.py"),
+    ),
     "cuts": Part(
         "1,000 connections to Postgres cut at any moment",
         {"SOAK_CUTS": "1000"},

@@ -26,19 +26,21 @@ def mortal() -> Iterator[Server]:
 
 
 class Hand:
-    """A client who writes things into a graph, and reconnects until they are durable."""
+    """A client who writes things into a graph, and reconnects until they are durable, for so many
+    seconds (`patience`)."""
 
-    def __init__(self, editor: Editor, graph: str) -> None:
+    def __init__(self, editor: Editor, graph: str, *, patience: float = 40) -> None:
         self.doc: Doc[Any] = Doc()
         self.things = self.doc.get("things", type=Map)
         self.turned_away = 0
         self._editor = editor
         self._graph = graph
+        self._patience = patience
 
     async def write(self, name: str) -> None:
         """Write a thing, and wait until it is acknowledged."""
         self.things[name] = name
-        async with asyncio.timeout(40):
+        async with asyncio.timeout(self._patience):
             while not await self._acknowledged():
                 self.turned_away += 1
                 await asyncio.sleep(0.1)

@@ -502,12 +502,9 @@ def _copy(options: argparse.Namespace) -> int:
     if url.drivername not in {"postgresql", "postgres"} or not url.database:
         raise CannotStart("--to is a Postgres database: postgresql://USER@HOST/NAME.")
     # Slow to load, and most who ask about runs do not need it.
-    from sqlalchemy.ext.asyncio import create_async_engine
-
     from action_assistant.commands.databases.runs_copy import RunsCopier, followed, once
+    from action_assistant.journal.failover import engine_of, failover_of
 
-    engine = create_async_engine(
-        url.set(drivername="postgresql+asyncpg"), connect_args={"timeout": 5}, pool_size=1
-    )
+    engine = engine_of(failover_of(url)[1], {"timeout": 5}, pool_size=1)
     copier = RunsCopier(path, settings.keep(data).folder, engine, Progress())
     return asyncio.run(followed(copier) if options.follow else once(copier, str(url.database)))

@@ -151,6 +151,13 @@ _AWAY: Final = {
 }
 
 
+#: What the driver of Postgres says when the server, or what is between, ends a connection.
+_ENDED: Final = (
+    "connection was closed in the middle of operation",
+    "unexpected connection_lost() call",
+)
+
+
 def cause_of(error: Exception) -> str:
     """Return the text of an error of a database or disk, without a full stop."""
     cause: object = error.orig if isinstance(error, DBAPIError) else error
@@ -160,4 +167,7 @@ def cause_of(error: Exception) -> str:
         return f"the database server does not answer ({_AWAY[cause.errno]})"
     if isinstance(cause, OSError) and cause.errno is not None:
         return os.strerror(cause.errno)
-    return str(cause).strip().rstrip(".") or type(cause).__name__
+    text = str(cause).strip().rstrip(".")
+    if text in _ENDED:
+        return "the database server ended the connection"
+    return text or type(cause).__name__

@@ -11,13 +11,14 @@ from typing import Any, Final, TypeVar
 import asyncpg  # type: ignore[import-untyped]
 from sqlalchemy import URL, Connection, NullPool, func, select
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
-from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Before, Branch, Overtaken, cause_of, no_copy
 from action_assistant.journal.events import Event
+from action_assistant.journal.failover import Failover, engine_of, failover_of, hosts_of
 from action_assistant.journal.migrate import kept_as_it_is, upgrade_to
 from action_assistant.schema.editor_tables import editor_event
 
@@ -66,6 +67,11 @@ FROM unnest($1::text[], $2::bigint[], $3::text[], $4::text[], $5::bigint[],
             $6::bytea[], $7::bigint[], $8::bytea[])
     AS e (stream, seq, kind, author, at, body, position, chain)
 """
+#: A commit that waits for the replica: once it is confirmed, the replica has all that came before, also a
+#: commit whose wait ended with its connection, and that would be lost in a failover (decision 168).
+_BARRIER: Final = "SELECT pg_logical_emit_message(true, 'action-assistant', '')"
+_STANDBYS: Final = "SELECT current_setting('synchronous_standby_names')"
+_IDENTIFIER: Final = "SELECT system_identifier::text FROM pg_control_system()"
 _END_OLD: Final = """
 SELECT pg_terminate_backend(pid) FROM pg_stat_activity
 WHERE application_name = $1 AND pid <> pg_backend_pid()
@@ -175,8 +181,8 @@ class Postgres:
     )
 
     def __init__(self, url: URL) -> None:
-        self._url: Final = url.set(drivername="postgresql+asyncpg")
-        self.name: Final = f"The database {url.set(username=None, password=None, query={})}"
+        self._failover, self._url = failover_of(url)
+        self.name: Final = f"The database {_named(url)}"
         self.address: Final = url.set(drivername="postgresql").render_as_string(hide_password=False)
         self._me = f"action-assistant {os.getpid()} {secrets.token_hex(8)}"
         self._key = 0
@@ -219,7 +225,7 @@ class Postgres:
         Raise CannotStart if the database cannot be used."""
 
         async def change() -> T:
-            engine = create_async_engine(self._url, poolclass=NullPool)
+            engine = engine_of(self._url, {}, poolclass=NullPool)
             try:
                 async with engine.begin() as connection:
                     await connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7205759403)")
@@ -236,21 +242,34 @@ class Postgres:
         """Connect, become the only writer (again), and return the session. Once it has the lock,
         this process's last session has ended on the server, and its last commit has either happened
         or never will."""
-        return PostgresSession(
-            self._engine({"application_name": self._me}, poolclass=NullPool), self._take_over
-        )
+        server = {"application_name": self._me}
+        if self._failover is not None:
+            server["synchronous_commit"] = (
+                "on"  # whatever the server is told while we are connected
+            )
+        return PostgresSession(self._engine(server, poolclass=NullPool), self._take_over)
 
     async def _take_over(self, raw: Any) -> None:
         for name, (allowed, why) in _SETTINGS.items():
             value = await raw.fetchval("SELECT current_setting($1)", name)
             if value not in allowed:
                 raise Unfit(f"{why} ({name} is {value})")
+        await self._check_failover(raw)
         await raw.execute(_END_OLD, self._me)
         until = time.monotonic() + _HANDOVER
         while not await raw.fetchval("SELECT pg_try_advisory_lock($1)", self._key):
             if time.monotonic() > until:
                 raise Unfit("it is in use by another process")
             await asyncio.sleep(0.05)
+        if self._failover is not None:
+            await raw.execute(_BARRIER)
+
+    async def _check_failover(self, raw: Any) -> None:
+        """Raise Unfit if a failover could lose what the server confirms."""
+        if self._failover is not None:
+            standbys, identifier = await raw.fetchval(_STANDBYS), await raw.fetchval(_IDENTIFIER)
+            if why := await self._failover.weakness(standbys, identifier):
+                raise Unfit(why)
 
     def lost(self, error: Exception) -> bool:
         """Return whether an error is the fault of the server or the connection, and not of the
@@ -302,26 +321,23 @@ class Postgres:
         """Do nothing: the lock ended with the session that wrote."""
 
     def _engine(self, server: dict[str, str], **options: Any) -> AsyncEngine:
-        return create_async_engine(
-            self._url,
-            isolation_level="AUTOCOMMIT",  # this module sends BEGIN and COMMIT itself
-            connect_args={
-                "timeout": _CONNECT,
-                "command_timeout": _ANSWER,
-                "server_settings": server,
-            },
-            **options,
-        )
+        arguments = {
+            "timeout": _CONNECT,
+            "command_timeout": _ANSWER,
+            "server_settings": server,
+        }
+        # This module sends BEGIN and COMMIT itself.
+        return engine_of(self._url, arguments, isolation_level="AUTOCOMMIT", **options)
 
     @property
     def _the(self) -> str:
         return self.name[0].lower() + self.name[1:]
 
 
-def weakness(connection: Connection) -> str:
-    """Return a sentence about the first server setting that forbids writing to a database (an
-    event could be lost, or the server is a read-only copy); "" if all settings are right. It only
-    reads."""
+def weakness(connection: Connection, failover: Failover | None) -> str:
+    """Return a sentence about the first setting that forbids writing to a database (an event could be
+    lost, or the server is a read-only copy); "" if all settings are right. It only reads. `connection`
+    belongs to an asynchronous one; `failover`: how the servers take over from each other."""
     for name, (allowed, why) in _SETTINGS.items():
         if name == _READ_ONLY:  # as whoever only looks has it
             value = "on" if connection.execute(select(func.pg_is_in_recovery())).scalar() else "off"
@@ -329,11 +345,24 @@ def weakness(connection: Connection) -> str:
             value = str(connection.execute(select(func.current_setting(name))).scalar())
         if value not in allowed:
             return f"{why} ({name} is {value})"
-    return ""
+    if failover is None:
+        return ""
+    standbys, identifier = (
+        str(connection.exec_driver_sql(asked).scalar_one()) for asked in (_STANDBYS, _IDENTIFIER)
+    )
+    return str(await_only(failover.weakness(standbys, identifier)))
 
 
 class Unfit(OSError):
     """A database that answers, but must not be written to."""
+
+
+def _named(url: URL) -> str:
+    """Return a URL for people: its servers and its name, without users and passwords."""
+    hosts = hosts_of(url)
+    if len(hosts) < 2:
+        return str(URL.create("postgresql", host=url.host, port=url.port, database=url.database))
+    return f"postgresql://{','.join(hosts)}/{url.database}"
 
 
 async def _hear() -> None:

@@ -27,6 +27,7 @@ from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.database import Database, cause_of
 from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.journal.events import Event
+from action_assistant.journal.failover import failover_of, hosts_of
 from action_assistant.journal.migrate import recognize, revisions_of, steps_after
 from action_assistant.journal.postgres import weakness
 from action_assistant.schema.editor_tables import editor_event, editor_head, graph
@@ -41,7 +42,7 @@ _PASSWORD: Final = (
 def fault(url: str, error: Exception) -> Diagnostic:
     """Return the diagnostic for a database that could not be asked, by its error. `url` has no
     password."""
-    host = make_url(url).host or "this computer"
+    host = " or ".join(hosts_of(make_url(url))) or "this computer"
     causes = [*_causes(error)]
     if any(isinstance(each, socket.gaierror) for each in causes):
         return found(
@@ -444,7 +445,7 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
     shown = database_location.shown(url)
     database = database_of(url)
     try:
-        seen = anyio.run(_asked, database, data)
+        seen = anyio.run(_asked, url, database, data)
     except (NewerSchema, AnothersDatabase) as error:
         yield _refused(shown, error)
         return
@@ -470,7 +471,7 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
                 "database-unsafe",
                 shown,
                 f"No editor writes to this database: {seen.weak}.",
-                "Change that in its postgresql.conf, and reload it.",
+                "Change that in its postgresql.conf (or Patroni's settings), and reload it.",
             )
         )
     yield from problems
@@ -478,14 +479,15 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
         yield fine(shown, "The database answers, and keeps what it confirms.")
 
 
-async def _asked(database: Database, data: Path) -> _DatabaseFindings:
-    """Examine a database on a server without changing it, and return the results. `data`: the data
-    folder. Raise its driver's errors or TimeoutError if it does not answer, CannotStart for a
+async def _asked(url: str, database: Database, data: Path) -> _DatabaseFindings:
+    """Examine the database `url` on a server without changing it, and return the results. `data`: the
+    data folder. Raise its driver's errors or TimeoutError if it does not answer, CannotStart for a
     database of another program."""
     seen = _DatabaseFindings()
+    failover, _ = failover_of(make_url(url))
 
     def question(connection: Connection) -> None:
-        seen.weak = weakness(connection)
+        seen.weak = weakness(connection, failover)
         seen.lacks = not _holds_mark(connection, data)
         _examine(database, connection, seen)
 
