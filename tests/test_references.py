@@ -186,7 +186,7 @@ def test_hazards_that_are_named_are_described() -> None:
         for code in _HAZARD.findall(text_of(path))
     }
     assert {"H1", "H2b", "H12"} <= named
-    assert sorted(code for code in named if f"\n| `{code}` |" not in described) == []
+    assert sorted(code for code in named if f"\n- `{code}`: " not in described) == []
 
 
 def test_every_document_is_linked_from_the_first_page() -> None:
