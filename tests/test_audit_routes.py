@@ -25,6 +25,7 @@ LOOKS: Final = {
     *("editor post /api/pieces", "editor post /api/graphs/{graph_id}/rehearsal"),
     *("editor post /api/actions/{action_id}/umrf", "editor post /api/logins/look"),
     *("runner post /api/preflight", "runner post /api/queue/{entry}/look"),
+    "runner post /api/repeats/{repeat}/look",
     "runner post /api/expectations/check",
     *("runner post /api/expectations/proposal", "runner post /api/runs/{run}/script"),
     "runner post /api/asked_inputs",

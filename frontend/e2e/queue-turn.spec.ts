@@ -133,7 +133,7 @@ test("at its turn the baton is taken and the second person is asked where the st
   const { page } = ada;
   await turn(page).getByRole("button", { name: "Look before the start" }).click();
   await expect(turn(page)).toContainText("In the way: Nobody holds the baton of David");
-  await expect(turn(page)).toContainText("nobody else has said yes to exactly this graph");
+  await expect(turn(page)).toContainText("nobody else has said yes to exactly this start");
   await expect(turn(page).getByRole("button", { name: /A check prevents/ })).toBeDisabled();
   await picture(page, "turn-360");
   await turn(page).getByRole("button", { name: "Take the baton" }).click();
@@ -142,7 +142,7 @@ test("at its turn the baton is taken and the second person is asked where the st
   await picture(page, "closed-360");
   await closed.getByRole("button", { name: "Look again, and open it" }).click();
   await turn(page).getByRole("button", { name: "Look before the start" }).click();
-  await expect(turn(page)).toContainText("nobody else has said yes to exactly this graph");
+  await expect(turn(page)).toContainText("nobody else has said yes to exactly this start");
   await expect(turn(page)).not.toContainText("baton of David");
   await turn(page).getByRole("button", { name: "Ask others for their yes" }).click();
   await expect(turn(page)).toContainText(
@@ -158,7 +158,7 @@ test("at its turn the baton is taken and the second person is asked where the st
     .getByRole("button", { name: /^Say yes to v2/ })
     .click();
   await expect(turn(other)).toContainText("You said yes to v2: somebody else may start it.");
-  await expect(turn(page)).toContainText("Ben said yes to exactly this graph.");
+  await expect(turn(page)).toContainText("Ben said yes to exactly this start.");
   await expect(turn(page).getByRole("button", { name: "Ask others for their yes" })).toBeHidden();
   await picture(page, "ready-360");
   expect(await isTooWide(page)).toBe(false);

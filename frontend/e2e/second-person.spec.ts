@@ -97,3 +97,40 @@ test("what another has said yes to starts", async () => {
     (await product.ask<{ state: string }[]>("/api/runs", {}, product.runnerUrl))[0]?.state;
   await expect.poll(state, { timeout: 20_000 }).toBe("finished");
 });
+
+test("a yes to single starts is none to a repeat: all of it is asked, and read on a phone", async () => {
+  const { page } = ada;
+  await openStart(page);
+  await dialog(page).getByRole("checkbox", { name: "Repeat it" }).check();
+  await dialog(page)
+    .getByRole("button", { name: /^Repeat v1 on David: 3 runs/ })
+    .click();
+  await expect(page).toHaveURL(/\/runs\/repeats\//);
+  const first = page.getByRole("button", { name: /^Start run 1 of 3/ });
+  await expect(first).toBeEnabled();
+  const asks = page.getByRole("region", { name: "A second person" });
+  await expect(asks).toContainText("3 runs in 3 rounds, each by a press", { timeout: 20_000 });
+  await first.focus();
+  await page.keyboard.down("Enter");
+  await expect(page.getByRole("alert")).toContainText("nobody else has said yes to exactly this");
+  await page.keyboard.up("Enter");
+  await asks.getByRole("button", { name: "Ask others for their yes" }).click();
+
+  const phone = ben.page;
+  await phone.setViewportSize({ width: 360, height: 740 });
+  await openStart(phone);
+  const asked = phone.getByRole("region", { name: /Ada.* asks for a second person/ });
+  await expect(asked).toContainText("3 runs in 3 rounds, each by a press");
+  await expect(asked).toContainText("none in force");
+  await asked.scrollIntoViewIfNeeded();
+  await phone.screenshot({ path: test.info().outputPath("asked-360.png") });
+  await asked.getByRole("button", { name: /^Say yes to exactly this/ }).click();
+  await expect(asked).toContainText("You said yes to exactly this.");
+
+  await expect(asks).toContainText("Said yes to all of 3 runs", { timeout: 20_000 });
+  await first.focus();
+  await page.keyboard.down("Enter");
+  await expect(page.getByRole("cell", { name: /^Run \d+/ })).toBeVisible({ timeout: 20_000 });
+  await page.keyboard.up("Enter");
+  await page.screenshot({ path: test.info().outputPath("repeat-1440.png"), fullPage: true });
+});

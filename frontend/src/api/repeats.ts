@@ -19,6 +19,7 @@ export interface RepeatOrder {
 }
 
 const POLL = 1_000; // ms
+const LOOK_AGAIN = 5_000; // ms
 const SUMMED_WITHIN = 15_000; // ms after its end a run has its sums
 
 /** Return whether the times of a run that has just ended are still to come. */
@@ -54,6 +55,26 @@ export function useRepeats(runner: string | undefined) {
     queryKey: ["repeats"],
     queryFn: ({ signal }) => runnerAt(runner).get("/api/repeats", { query: {}, signal }),
     enabled: runner !== undefined,
+  });
+}
+
+/** Query what a look before the next run of a repeat finds, again and again: a yes may come. */
+export function useCellLook(
+  runner: string,
+  { id, next }: Pick<Repeat, "id" | "next">,
+  on: boolean,
+) {
+  return useQuery({
+    queryKey: ["repeat-look", id, next],
+    queryFn: () => {
+      const body = { watching: {} };
+      return runnerAt(runner).post("/api/repeats/{repeat}/look", { path: { repeat: id }, body });
+    },
+    enabled: on,
+    refetchInterval: LOOK_AGAIN,
+    gcTime: 0,
+    staleTime: 0,
+    retry: false,
   });
 }
 

@@ -15,7 +15,8 @@ import {
 } from "../api/queue";
 import type { PreflightItem } from "../api/robots";
 import type { Watching } from "../api/runs";
-import { askingRobots, BatonRemedy, ConfirmFirst, SecondPerson } from "../status/start-remedies";
+import { SecondPerson } from "../status/second-person";
+import { askingRobots, BatonRemedy, ConfirmFirst } from "../status/start-remedies";
 import { sendNoted, Unanswered } from "../status/unanswered-starts";
 import { useWatching, WatchTicks } from "../status/watching";
 import { HoldButton } from "../ui/hold-button";

@@ -14,12 +14,14 @@ import {
   reopenRepeat,
   startCell,
   tableUrl,
+  useCellLook,
   useRepeat,
   useRepeats,
 } from "../api/repeats";
 import type { DurationBounds, Run } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/progress";
+import { SecondPerson } from "../status/second-person";
 import { StateLabel } from "../status/state-label";
 import { lineWords, valueLines } from "../status/value-words";
 import { useWatching, WatchTicks } from "../status/watching";
@@ -129,6 +131,8 @@ function Commands({ repeat, runner }: { repeat: Repeat; runner: string }) {
   const offers = may && next !== null && !repeat.by_itself && isOpen;
   const what = `${next === 1 ? "start" : "reset done, start"} run ${next} of ${total}`;
   const label = next === 1 ? `Start run 1 of ${total}` : `Reset done: start ${next} of ${total}`;
+  const waits = may && moves && next !== null && repeat.state !== "running";
+  const look = useCellLook(runner, repeat, waits);
   const disabled = repeat.state !== "waiting" || start.isPending || watch.obstacle !== null;
   return (
     <section className={style.commands} aria-label="Commands">
@@ -161,6 +165,15 @@ function Commands({ repeat, runner }: { repeat: Repeat; runner: string }) {
         <TableFile href={tableUrl(runner, id, "csv")} name="CSV" />
         {repeat.parquet && <TableFile href={tableUrl(runner, id, "parquet")} name="Parquet" />}
       </div>
+      {waits && (
+        <SecondPerson
+          graph={repeat.graph ?? ""}
+          label={`all of ${counted(total, "run")}`}
+          looks={look.data}
+          values={{}}
+          taken={null}
+        />
+      )}
       {!repeat.parquet && (
         <details className="quiet-12">
           <summary>Parquet</summary>

@@ -25,6 +25,7 @@ from action_assistant.commands.drafts import changes_lines
 from action_assistant.commands.presses import press
 from action_assistant.commands.questions import add_questions
 from action_assistant.commands.repeats import add_repeats
+from action_assistant.commands.second_person import add_second_person
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.difference import Difference
@@ -92,6 +93,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     steps.set_defaults(handler=_step)
     add_questions(more)
     add_repeats(more)
+    add_second_person(more)
     _add_archives(more)
     _add_copy(more)
     _add_since(more)

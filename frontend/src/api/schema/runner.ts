@@ -191,8 +191,9 @@ export interface RunnerApi {
     };
     /**
      * ApprovalWanted
-     * @description A person's question for the yes of others to a start: `digest` is that of its whole order,
-     *     `values` are those that it gives the graph.
+     * @description A person's question for the yes of others to a start: `digest` is that of its whole order, and
+     *     `order` says all of it in words, by a look of the runner (nothing where that is not known);
+     *     `values` are those that it gives the graph, `tree_digest` is that of its version, "" if not known.
      */
     ApprovalWanted: {
         digest: string;
@@ -206,6 +207,8 @@ export interface RunnerApi {
                 [key: string]: boolean | number | string | (boolean | number | string)[];
             };
         };
+        order: RunnerApi["OrderLine"][];
+        tree_digest: string;
     };
     /**
      * ArchiveRequest
@@ -566,6 +569,17 @@ export interface RunnerApi {
             };
         };
         run: RunnerApi["Listed"] | null;
+    };
+    /**
+     * CellLookRequest
+     * @description Asks for the pre-flight of the next cell of a repeat as it is now. `watching`: as in
+     *     `StartRequest`.
+     */
+    CellLookRequest: {
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
     };
     /**
      * CheckRequest
@@ -1643,6 +1657,14 @@ export interface RunnerApi {
         until?: string | null;
     };
     /**
+     * OrderLine
+     * @description A part of an order in words. `what`: its name, as "Limit"; `text`: what it is.
+     */
+    OrderLine: {
+        what: string;
+        text: string;
+    };
+    /**
      * Origin
      * @description The connection by which a person acted, as an event keeps it.
      *
@@ -1809,8 +1831,8 @@ export interface RunnerApi {
      * @description The pre-flight of a graph on one engine. `override`: the codes that a person would have to
      *     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
      *     `tree_digest`: of it together with the graphs inside; `order_digest`: of all that a second person
-     *     says yes to, "" where nobody has to; `earlier`: what the start takes for granted, on the first engine
-     *     of it, null if it begins at the entry.
+     *     says yes to, "" where nobody has to, and `order` that in words; `earlier`: what the start takes for
+     *     granted, on the first engine of it, null if it begins at the entry.
      */
     Preflight: {
         engine: string;
@@ -1821,6 +1843,7 @@ export interface RunnerApi {
         never: boolean;
         order_digest: string;
         earlier: RunnerApi["EarlierShown"] | null;
+        order: RunnerApi["OrderLine"][];
     };
     /**
      * Problem
@@ -3619,6 +3642,9 @@ export interface RunnerPaths {
     "/api/repeats/{repeat}/table": {
         get: RunnerOperations["exportRepeat"];
     };
+    "/api/repeats/{repeat}/look": {
+        post: RunnerOperations["lookAtCell"];
+    };
     "/api/repeats/{repeat}/start": {
         post: RunnerOperations["startCell"];
     };
@@ -4284,6 +4310,25 @@ interface RunnerOperations {
             200: {
                 content: {
                     "text/csv": string;
+                };
+            };
+        };
+    };
+    lookAtCell: {
+        parameters: {
+            path: {
+                repeat: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["CellLookRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Preflight"][];
                 };
             };
         };

@@ -21,7 +21,8 @@ import { isReadyMade, rolesIn } from "../../graph/questions";
 import { type Beginning, beginningWords } from "../../status/earlier-list";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
-import { askingRobots, ConfirmFirst, SecondPerson } from "../../status/start-remedies";
+import { SecondPerson, WantedYes } from "../../status/second-person";
+import { askingRobots, ConfirmFirst } from "../../status/start-remedies";
 import { EngineLabel } from "../../status/state-label";
 import { lineWords, valueLines } from "../../status/value-words";
 import { useWatching, WatchTicks } from "../../status/watching";
@@ -566,6 +567,7 @@ export function StartDialog(props: Props) {
         values={values ?? {}}
         taken={given.taken}
       />
+      <WantedYes graph={graph} looks={looks} />
       <ConfirmFirst looks={looks} />
       <footer className={style.foot}>
         {codes.length > 0 && (mayWait(looks) || !looks?.some(({ never }) => never)) && (

@@ -16,6 +16,7 @@ from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.repeats import tables
 from action_assistant.runner.repeats.repeat import (
     MOST,
+    CellLookRequest,
     NextRequest,
     ReopenRequest,
     Repeat,
@@ -34,6 +35,7 @@ from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.sight import HIDDEN_GRAPH, Unseen
 from action_assistant.runner.start.admission import decoded
 from action_assistant.runner.start.orders import engines_of
+from action_assistant.runner.start.preflight import Preflight
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.auth.access import Needs, identity_of, require
@@ -129,6 +131,19 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
+        "/api/repeats/{repeat:str}/look",
+        operation_id="lookAtCell",
+        status_code=200,
+        summary="The pre-flight of the next run of a repeat as it is now; it changes nothing",
+        opt=reads(CellLookRequest),
+        guards=[Needs("simulate")],
+    )
+    async def look(repeat: str, request: _Asking) -> list[Preflight]:
+        asked = decoded(await request.body(), CellLookRequest)
+        await _seen(services, request, repeat)
+        return await services.repeats.look(repeat, asked.watching, identity_of(request))
+
+    @post(
         "/api/repeats/{repeat:str}/start",
         operation_id="startCell",
         description="Of people only. `cell` is the `next` one; starting one again answers its run.",
@@ -182,7 +197,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
             opened = await services.repeats.reopen(repeat, asked, author, me)
         return await _shown(services, request, opened)
 
-    return [start, close, reopen]
+    return [look, start, close, reopen]
 
 
 async def _seen(services: RunnerServices, request: _Asking, repeat: str) -> Repeat:

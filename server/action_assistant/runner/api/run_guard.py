@@ -55,7 +55,10 @@ FILTERED: Final = frozenset(
         *("/api/robots/{name:str}/umrf", "/api/robots/{name:str}/recordings/{file:str}"),
         *("/api/robots/{name:str}/rights", "/api/robots/{name:str}/lock"),
         *("/api/robots/{name:str}/unlock", "/api/robots/{name:str}/drills"),
-        *(f"/api/repeats/{{repeat:str}}/{each}" for each in ("table", "start", "close", "open")),
+        *(
+            f"/api/repeats/{{repeat:str}}/{each}"
+            for each in ("table", "look", "start", "close", "open")
+        ),
         *(f"/api/queue/{{entry:str}}/{each}" for each in ("look", "start", "move", "remove")),
         *("/api/queue/robots/{name:str}/close", "/api/queue/robots/{name:str}/open"),
         *(f"/api/robots/{{name:str}}/baton/{each}" for each in ("take", "hand", "drop")),

@@ -70,7 +70,7 @@ from action_assistant.runner.start.approvals import (
     ApprovalQuestion,
     ApprovalRequest,
 )
-from action_assistant.runner.start.orders import engines_of
+from action_assistant.runner.start.orders import OrderLine, engines_of
 from action_assistant.umrf.semantics import Script
 from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.audit.events import OwnerDid, StartRefused
@@ -511,8 +511,9 @@ class Approval(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ApprovalWanted(msgspec.Struct, frozen=True, kw_only=True):
-    """A person's question for the yes of others to a start: `digest` is that of its whole order,
-    `values` are those that it gives the graph."""
+    """A person's question for the yes of others to a start: `digest` is that of its whole order, and
+    `order` says all of it in words, by a look of the runner (nothing where that is not known);
+    `values` are those that it gives the graph, `tree_digest` is that of its version, "" if not known."""
 
     digest: str
     author: Author
@@ -520,6 +521,8 @@ class ApprovalWanted(msgspec.Struct, frozen=True, kw_only=True):
     robots: tuple[str, ...]
     version: str
     values: StartValues
+    order: tuple[OrderLine, ...]
+    tree_digest: str
 
 
 class AskedOthers(msgspec.Struct, frozen=True):
@@ -534,7 +537,8 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         summary="The approvals of a graph, by its digest",
         operation_id="listApprovals",
         description="Of a start with values, overrides or several robots `digest` is the "
-        "`order_digest` of its pre-flight, else the tree digest.",
+        "`order_digest` of its pre-flight, which says the same in words (`order`), else the tree digest. "
+        "That of a repeat, or of a turn in the queue, comes with its own `look`.",
         guards=[Needs("see")],
     )
     async def approvals(
@@ -595,6 +599,8 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
                 robots=each.robots,
                 version=each.version,
                 values=each.values,
+                order=each.order,
+                tree_digest=each.tree_digest,
             )
             for each in found
         ]

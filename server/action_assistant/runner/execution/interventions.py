@@ -128,7 +128,7 @@ async def modify(
         _require_own_sight(asked.sight, ready)
     if engine is not None:
         order = order_of(start, ready.digest, (), limits)
-        await approvals.require(engine.registration, order, author.id)
+        await approvals.require(engine.registration, [order], author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
         if limits.get(run.engine):
             await _require_held(engine, run, ready.umrf, run_in_worker)

@@ -68,7 +68,7 @@ from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.drills import DrillRequest, drill_of
 from action_assistant.runner.start.idempotency import StopOrder
 from action_assistant.runner.start.led_items import IndexingWords
-from action_assistant.runner.start.orders import watched_in
+from action_assistant.runner.start.orders import Often, watched_in
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.rights_registry import IdentityNow, RightsRegistry, unchanged
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
@@ -302,34 +302,41 @@ class ExecutionService:
         author: Author,
         identity: Identity | None = None,
         repeat: PartOfRepeat | None = None,
+        often: Often = None,
     ) -> Started:
-        """Carry out a start, at most once per request id. Return after the one start message was
-        sent. `identity`: the identity of the author; None for an operator without groups; `repeat`:
-        the repeat of which the run is a cell. Raise a subclass of Refused if the start is refused;
-        nothing was sent then."""
+        """Carry out a start, at most once per request id, and return when its one message was sent.
+        `identity`: of the author, None for an operator without groups; `repeat`, `often`: as in the
+        pipeline. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         starter = identity or operator_of(author)
         self.rights.act(starter)
-        return await self._starts.start(request, author, starter, repeat)
+        return await self._starts.start(request, author, starter, repeat, often)
 
     async def start_group(
-        self, group: GroupRequest, author: Author, identity: Identity | None = None
+        self,
+        group: GroupRequest,
+        author: Author,
+        identity: Identity | None = None,
+        often: Often = None,
     ) -> Grouped:
-        """Start one version on several robots, and return the runs and the robots that nothing was
-        sent to. All starts are accepted before the first message is sent. `identity`: as for `start`.
-        Raise a subclass of Refused if one start is refused; nothing was sent to any robot then."""
+        """Start one version on several robots: all starts are accepted before the first message is sent.
+        `identity`, `often`: as for `start`. Raise a subclass of Refused if one start is refused; nothing
+        was sent to any robot then."""
         starter = identity or operator_of(author)
         self.rights.act(starter)
-        return await self._starts.start_group(group, author, starter)
+        return await self._starts.start_group(group, author, starter, often)
 
     async def look(
-        self, group: GroupRequest, starter: str = "", identity: Identity | None = None
+        self,
+        group: GroupRequest,
+        starter: str = "",
+        identity: Identity | None = None,
+        often: Often = None,
     ) -> list[Preflight]:
-        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
-        would start, `identity` as for `start`. Only a get is sent. Raise Forbidden if the starter may
-        not see the graph, or one inside."""
+        """Return the pre-flight of a start on each engine for the person with the id `starter`. Only a
+        get is sent. Raise Forbidden if they may not see the graph, or one inside."""
         by = identity or operator_of(Author(starter, ""))
         await self._checks.require_sight(group, by)
-        return await self._checks.look(group, by)
+        return await self._checks.look(group, by, often)
 
     async def asked_inputs(
         self, wanted: AskedInputsRequest, identity: Identity
@@ -339,8 +346,7 @@ class ExecutionService:
         return await self._earlier.asked_inputs(wanted, identity)
 
     def under_way(self, request_id: str) -> bool:
-        """Return whether the start, or the start of a group, with this request id is being carried
-        out at this moment."""
+        """Return whether the start, of a group too, with this request id is being carried out now."""
         return self._starts.is_under_way(request_id)
 
     def next_number(self) -> int:

@@ -53,9 +53,11 @@ from action_assistant.runner.start.led_items import (
     with_beginning,
 )
 from action_assistant.runner.start.orders import (
+    Often,
+    Ordered,
     claim_of,
     engines_of,
-    order_of,
+    ordered,
     overridden_in,
     require_plain,
     watched_in,
@@ -151,10 +153,12 @@ class StartChecks:
         unsighted = request.sight is None and sight.has_rules
         return msgspec.structs.replace(requested, sight=request.sight, unsighted=unsighted)
 
-    async def accept(self, request: StartRequest, starter: Identity) -> AcceptedStart:
+    async def accept(
+        self, request: StartRequest, starter: Identity, often: Often = None
+    ) -> AcceptedStart:
         """Take a request through all checks that may refuse it, and wait for the answer of the
-        robot. `starter`: the person who starts. Raise a subclass of Refused if one check
-        does."""
+        robot. `starter`: the person who starts; `often`: how often it is carried out. Raise a subclass of
+        Refused if one check does."""
         if request.drill and len(engines_of(request)) != 1:
             raise BadInput("A Stop drill is made on one robot.", where={"path": "/drill"})
         if self.leads(request.engine, request.robots):
@@ -163,7 +167,7 @@ class StartChecks:
                 raise BadInput(
                     "A Stop drill is made with a graph that is handed over whole.", where=where
                 )
-            return await self._accept_conducted(request, starter)
+            return await self._accept_conducted(request, starter, often)
         earlier = await self._earlier.read(request, starter)
         require_not_led(request.robots, request.people)
         watched_in(request.watching, engines_of(request))
@@ -176,7 +180,7 @@ class StartChecks:
         require_plain(request)
         prepare = partial(prepared, earlier=earlier, limits=limits)
         ready = await self._run_in_worker(prepare, request, robot.facts, random_id())
-        order = order_of(request, ready.tree_digest, overridden_in(request), limits)
+        order = ordered(request, ready.tree_digest, overridden_in(request), limits, often)
         return await self._accept_on(robot, request, ready, starter, order=order)
 
     def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
@@ -186,12 +190,12 @@ class StartChecks:
         return engine == CONDUCTED and (bool(robots) or CONDUCTED not in self._robots.names)
 
     async def accept_all(
-        self, requests: Sequence[StartRequest], starter: Identity
+        self, requests: Sequence[StartRequest], starter: Identity, often: Often = None
     ) -> list[AcceptedStart]:
         """Accept the starts on several engines, all at the same time, and wait for their answers.
-        `starter`: the id of the person. Raise Conflict, with the reasons of all engines, if at
+        `starter`, `often`: as for `accept`. Raise Conflict, with the reasons of all engines, if at
         least one start is refused."""
-        return await _all_accepted(requests, lambda each: self.accept(each, starter))
+        return await _all_accepted(requests, lambda each: self.accept(each, starter, often))
 
     async def _accept_on(
         self,
@@ -200,12 +204,12 @@ class StartChecks:
         ready: Prepared,
         starter: Identity,
         *,
-        order: str,
+        order: Ordered,
         is_led: bool = False,
     ) -> AcceptedStart:
         """Take a prepared start through the checks that concern its robot, and wait for its answer.
-        `starter`: the id of the person; `order`: the digest of the whole order; `is_led`: it is the part
-        of a led run on this robot.
+        `starter`: the id of the person; `order`: the whole order; `is_led`: it is the part of a led run
+        on this robot.
         Raise Unavailable if the robot does not answer, Conflict if a check fails."""
         await self._check(request, ready, robot, starter, order)
         try:
@@ -217,9 +221,11 @@ class StartChecks:
             )
         return await self._decide(request, ready, robot, view, starter, is_led=is_led)
 
-    async def _accept_conducted(self, request: StartRequest, starter: Identity) -> AcceptedStart:
+    async def _accept_conducted(
+        self, request: StartRequest, starter: Identity, often: Often
+    ) -> AcceptedStart:
         """Take the start of a led run through all checks, with all its robots at the same
-        time. `starter`: the person. Raise Conflict, with the reasons of all robots, if a
+        time. `starter`: the person; `often`: as for `accept`. Raise Conflict, with the reasons of all robots, if a
         check refuses it."""
         require_plain(request)
         watched_in(request.watching, engines_of(request))
@@ -230,7 +236,7 @@ class StartChecks:
         request = msgspec.structs.replace(request, robots=ready.robots, people=ready.people)
         items = (*beginning_items(ready.whole, request.start_from), *led_items(ready))
         overridden = overridden_in(request)
-        order = order_of(request, ready.whole.tree_digest, overridden, limits)
+        order = ordered(request, ready.whole.tree_digest, overridden, limits, often)
         preflight.require_clear(items, overridden)
         parts = [
             msgspec.structs.replace(request, engine=name, robots={}, people={})
@@ -292,13 +298,14 @@ class StartChecks:
         ready: Prepared,
         robot: KnownEngine,
         starter: Identity,
-        order: str,
+        order: Ordered,
     ) -> None:
         """Make the checks that need no answer of the engine: the rights of the robot, the yes of a second person, whether a
-        run keeps the robot, and whether anything is being stopped there. `starter`: the person; `order`: the digest of the whole order. Raise Conflict or Forbidden if one fails."""
+        run keeps the robot, and whether anything is being stopped there. `starter`: the person; `order`: the whole order. Raise Conflict or Forbidden if one fails."""
         self._rights.require([request.engine], starter, claim_of(request, ready))
-        what = _named(order, ready)
-        await self._approvals.require(robot.registration, order, starter.person.id, what)
+        await self._approvals.require(
+            robot.registration, order.approving, starter.person.id, _named(order)
+        )
         overridden = overridden_in(request)
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
         if self._foreign_stops.is_stopping(request.engine):
@@ -434,12 +441,14 @@ class StartChecks:
 
     # --- pre-flight ---------------------------------------------------------------------------
 
-    async def look(self, group: GroupRequest, starter: Identity) -> list[Preflight]:
+    async def look(
+        self, group: GroupRequest, starter: Identity, often: Often = None
+    ) -> list[Preflight]:
         """Return the pre-flight of a start on each engine that `group` names. `starter`: the
-        person who would start. A refusal becomes an item of the pre-flight. Nothing is stored;
+        person who would start; `often`: as for `accept`. A refusal becomes an item of the pre-flight. Nothing is stored;
         engines are only asked for their graphs. Raise Unavailable if a worker dies."""
         if any(self.leads(engine, group.robots) for engine in group.engines):
-            return await self._look_conducted(group.for_engine(CONDUCTED), starter)
+            return await self._look_conducted(group.for_engine(CONDUCTED), starter, often)
         found: dict[str, Preflight] = {}
         courses: list[Item] = []
 
@@ -464,11 +473,13 @@ class StartChecks:
         if refused:
             raise refused[0]
         looks = [preflight.with_items(found[engine], courses) for engine in group.engines]
-        return await self._approved(looks, group.for_engine(group.engines[0]), starter)
+        return await self._approved(looks, group.for_engine(group.engines[0]), starter, often)
 
-    async def _look_conducted(self, request: StartRequest, starter: Identity) -> list[Preflight]:
+    async def _look_conducted(
+        self, request: StartRequest, starter: Identity, often: Often
+    ) -> list[Preflight]:
         """Return the pre-flight of a led run: first that of the whole graph, then that of
-        each robot. `starter`: the person who would start."""
+        each robot. `starter`: the person who would start; `often`: as for `accept`."""
         try:
             earlier = await self._earlier.read(request, starter)
             limits = self._rights.limits(engines_of(request))
@@ -498,7 +509,7 @@ class StartChecks:
                 *await self._engine_items(robot, own, starter, led=request),
             ]
             found.append(preflight.with_verdict(name, listed, whole.digest, whole.tree_digest))
-        return await self._approved(found, request, starter)
+        return await self._approved(found, request, starter, often)
 
     async def _look(self, request: StartRequest, starter: Identity) -> Preflight:
         """Return the pre-flight of one engine. `starter`: the person who would start. A
@@ -558,10 +569,11 @@ class StartChecks:
         return [*items, *await self._look_led.items(robot, view.answer, starter, claim)]
 
     async def _approved(
-        self, looks: Sequence[Preflight], request: StartRequest, starter: Identity
+        self, looks: Sequence[Preflight], request: StartRequest, starter: Identity, often: Often
     ) -> list[Preflight]:
         """Return the pre-flights of a start with the items about a second person, who says yes also to
-        what it overrides; if it does not say that yet, to what all of them would."""
+        what it overrides; if it does not say that yet, to what all of them would. The order in words is
+        remembered for those who are asked."""
         codes = overridden_in(request) or {code for each in looks for code in each.override}
         found: list[Preflight] = []
         is_led = self.leads(request.engine, request.robots)
@@ -569,10 +581,16 @@ class StartChecks:
             is_robot = look.engine not in {SIMULATOR, CONDUCTED} and look.tree_digest
             robot = self._robots.registration(look.engine) if is_robot else None
             robots = engines_of(request) if is_led else (look.engine,)
-            order = order_of(request, look.tree_digest, codes, self._rights.limits(robots))
-            what = "this graph" if order == look.tree_digest else "this start"
-            item = robot and await self._approvals.item(robot, order, starter.person.id, what)
-            found.append(look if not item else preflight.with_order(look, item, order))
+            order = ordered(request, look.tree_digest, codes, self._rights.limits(robots), often)
+            item = robot and await self._approvals.item(
+                robot, order.approving, starter.person.id, _named(order)
+            )
+            if item:
+                lines = self._approvals.remember(order, request.graph)
+                look = msgspec.structs.replace(
+                    preflight.with_approval(look, item), order_digest=order.digest, order=lines
+                )
+            found.append(look)
         return found
 
     async def _course_items(self, group: GroupRequest, starter: Identity) -> Sequence[Item]:
@@ -605,9 +623,11 @@ def _code_of(refused: Refused) -> str:
     return "subgraph-across" if is_shared else "graph"
 
 
-def _named(order: str, ready: Prepared) -> str:
+def _named(order: Ordered) -> str:
     """Return in words what a second person says yes to."""
-    return "this graph" if order == ready.tree_digest else "this start"
+    if "repeat" in order.parts:
+        return "this repeat"
+    return "this start" if order.parts else "this graph"
 
 
 def require_led(robot: KnownEngine) -> None:

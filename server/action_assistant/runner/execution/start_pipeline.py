@@ -34,7 +34,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
-from action_assistant.runner.start.orders import claim_of, engines_of, kept_for
+from action_assistant.runner.start.orders import Often, claim_of, engines_of, kept_for
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.web.auth.identity import Identity
 
@@ -85,10 +85,11 @@ class StartPipeline:
         author: Author,
         starter: Identity,
         repeat: PartOfRepeat | None = None,
+        often: Often = None,
     ) -> Started:
         """Carry out a start of `starter`, at most once per request id. Return after the one start
-        message has left. `repeat`: the repeat of which the run is a cell. Raise a subclass of
-        Refused if the start is refused; nothing was sent then."""
+        message has left. `repeat`: the repeat of which the run is a cell; `often`: how often it is
+        carried out, for the yes of a second person. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         stops = self._stops.count
         async with self._claims.once(request.request_id):
             known = await self._known(request)
@@ -96,15 +97,17 @@ class StartPipeline:
                 return Started(known, fresh=False)
             await self._checks.require_sight(request, starter)
             async with self.turns(kept_for(request)):
-                accepted = await self._checks.accept(request, starter)
+                accepted = await self._checks.accept(request, starter, often)
                 run = await self._store_and_hand_over(
                     accepted, author, starter, stops, repeat=repeat
                 )
             return Started(run, fresh=True)
 
-    async def start_group(self, group: GroupRequest, author: Author, starter: Identity) -> Grouped:
+    async def start_group(
+        self, group: GroupRequest, author: Author, starter: Identity, often: Often = None
+    ) -> Grouped:
         """Start one version on several robots in the name of `author`. All starts are accepted
-        before the first message is sent. Raise BadInput if the group has no request id or names the
+        before the first message is sent. `often`: as in `start`. Raise BadInput if the group has no request id or names the
         simulator, another subclass of Refused if one start is refused; nothing was sent to any
         robot then."""
         stops = self._stops.count
@@ -126,7 +129,7 @@ class StartPipeline:
                 return Grouped(known[0].group or "", known, failed, fresh=False)
             await self._checks.require_sight(group, starter)
             async with self.turns(group.engines):
-                accepted = await self._checks.accept_all(requests, starter)
+                accepted = await self._checks.accept_all(requests, starter, often)
                 return await self._hand_over_group(accepted, author, starter, stops)
 
     # --- claim --------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.queues.entry import QueueClosed, QueueEntered, Waiting, queue_names_of
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sight import RunGraphs
+from action_assistant.runner.start.orders import InQueue
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.web.auth.identity import Identity
 
@@ -52,6 +53,11 @@ class Entry:
     def queue_names(self) -> tuple[str, ...]:
         """The names of the queues in which it waits."""
         return queue_names_of(self.entered.robots)
+
+    @property
+    def often(self) -> InQueue | None:
+        """How often it is carried out: once at this turn; None before its turn."""
+        return None if self.ready_at is None else InQueue(self.id, self.ready_at)
 
     @property
     def graphs(self) -> RunGraphs:

@@ -65,7 +65,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import QueuedStart
 from action_assistant.runner.start.admission import StartRequest, Watching
 from action_assistant.runner.start.kept_starts import graph_of, group_of, start_of, text_of
-from action_assistant.runner.start.orders import engines_of, overridden_in, watched_in
+from action_assistant.runner.start.orders import InQueue, engines_of, overridden_in, watched_in
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.rights import Denied, may
@@ -180,13 +180,13 @@ class Queues:
         return msgspec.structs.replace(start, request_id=request_of(entry.id), watching=watching)
 
     async def _look(
-        self, start: StartRequest, seen: Looked, identity: Identity, ready_at: int | None = None
+        self, start: StartRequest, seen: Looked, identity: Identity, turn: InQueue | None = None
     ) -> tuple[Look, Looked]:
-        looks = await self._control.look(group_of(start), identity.person.id, identity)
+        looks = await self._control.look(group_of(start), identity.person.id, identity, turn)
         of = self._control.rights.of
         now = looked_of(looks, {name: of(name).rules for name in engines_of(start)})
         differs = differences(seen, now, looks)
-        digest = digest_of(now, looks, ready_at)
+        digest = digest_of(now, looks, None if turn is None else turn.ready_at)
         return Look(tuple(looks), differs, digest, overridden_in(start)), now
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
@@ -195,7 +195,7 @@ class Queues:
         entry = self.find(id_)
         start = await self._start_in(entry, watching)
         self._survey()
-        return (await self._look(start, entry.entered.seen, identity, entry.ready_at))[0]
+        return (await self._look(start, entry.entered.seen, identity, entry.often))[0]
 
     # --- put, move, remove --------------------------------------------------------------------
 
@@ -252,7 +252,6 @@ class Queues:
         self, entered: QueueEntered, request: QueueRequest, identity: Identity
     ) -> tuple[Entry, bool]:
         author, stream = entered.author, stream_of(entered.entry)
-        kept = QueueStartKept(text_of(request.start))
         async with self._entering:
             known = await self._known(request, author)
             if known is not None:
@@ -260,6 +259,7 @@ class Queues:
             self._require_capacity(author)
             with anyio.CancelScope(shield=True):
                 try:
+                    kept = QueueStartKept(text_of(request.start))
                     drafts = [draft_of(entered, author.id), draft_of(kept, author.id)]
                     await self._journal.append(stream, drafts, expected=0)
                 except Refused:
@@ -478,7 +478,7 @@ class Queues:
             if entry not in self._entries:
                 return await self._started(id_)
             start = await self._start_in(entry, asked.watching)
-            look, _ = await self._look(start, entry.entered.seen, identity, ready_at)
+            look, _ = await self._look(start, entry.entered.seen, identity, entry.often)
             if look.digest != asked.look:
                 text = "It is not as you have looked at it. Look again."
                 if look.differs:
@@ -494,7 +494,8 @@ class Queues:
         its queue was closed since then, although it is open again."""
         if self._require_turn(entry) != ready_at:
             raise Conflict("Its queue was closed since, or a robot was not free. Look again.")
-        started = await self._control.start(start, author, identity)
+        turn = InQueue(entry.id, ready_at)
+        started = await self._control.start(start, author, identity, often=turn)
         self._leave(entry, started.run)
         return started
 

@@ -59,6 +59,13 @@ class NextRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     watching: Watching = {}
 
 
+class CellLookRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Asks for the pre-flight of the next cell of a repeat as it is now. `watching`: as in
+    `StartRequest`."""
+
+    watching: Watching = {}
+
+
 class ReopenRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Opens a closed repeat again after a look. `closings`: how often it was closed, as the person saw it;
     `watching`: as in `StartRequest`."""

@@ -47,7 +47,8 @@ from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest, Watching
 from action_assistant.runner.start.kept_starts import group_of, text_of
-from action_assistant.runner.start.orders import engines_of, watched_in
+from action_assistant.runner.start.orders import InRepeat, engines_of, watched_in
+from action_assistant.runner.start.preflight import Preflight
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.rights import Denied, may
@@ -275,7 +276,7 @@ class Repeats:
         self._require_at_rest(record)
         standing = self._doubts.standing(record)
         request = _start_of(record, cell, asked.watching)
-        await self._require_clear(request, identity)
+        await self._require_clear(record, request, identity)
         is_stored = False
         with anyio.move_on_after(_WAIT_S):
             async with record.storing:
@@ -295,14 +296,34 @@ class Repeats:
         self._close(record, reason, is_stored=True)
         raise Conflict(reason.text)
 
-    async def _require_clear(self, request: StartRequest, identity: Identity) -> None:
-        """Raise Conflict if a pre-flight of this start finds something that blocks it."""
+    async def look(self, id_: str, watching: Watching, identity: Identity) -> list[Preflight]:
+        """Return the pre-flight of the next cell of a repeat as it is now; nothing after the last one.
+        Raise NotFound if there is no such repeat."""
+        record = await self._loaded(id_)
+        cell = record.next_cell
+        if cell is None:
+            return []
+        return await self._look(record, _start_of(record, cell, watching), identity)
+
+    async def _look(
+        self, record: _Record, request: StartRequest, identity: Identity
+    ) -> list[Preflight]:
+        group, often = group_of(request), _often(record)
+        return await self._control.look(group, identity.person.id, identity, often)
+
+    async def _require_clear(
+        self, record: _Record, request: StartRequest, identity: Identity
+    ) -> None:
+        """Raise Conflict if a pre-flight of this start finds something that blocks it, but for the yes
+        of a second person, which each start needs."""
         overridden = set(request.override.codes) if request.override is not None else set()
-        for look in await self._control.look(group_of(request), identity.person.id, identity):
+        for look in await self._look(record, request, identity):
             blocked = [
                 each
                 for each in look.items
-                if each.verdict == "blocked" and not (each.overridable and each.code in overridden)
+                if each.verdict == "blocked"
+                and each.code != "approved"
+                and not (each.overridable and each.code in overridden)
             ]
             if blocked:
                 text = " ".join(each.text for each in blocked[:3])
@@ -351,7 +372,8 @@ class Repeats:
         self._require_at_rest(record)
         request = _start_of(record, cell, watching)
         part = PartOfRepeat(record.repeat.id, cell)
-        started = await self._control.start(request, author, identity, part)
+        often = _often(record)
+        started = await self._control.start(request, author, identity, part, often)
         record.runs[cell] = started.run.id
         return started
 
@@ -506,6 +528,20 @@ def _start_of(record: _Record, cell: int, watching: Watching) -> StartRequest:
         values=opened.cells[cell - 1],
         request_id=queries.request_of_cell(opened.repeat, cell),
         watching=watching,
+    )
+
+
+def _often(record: _Record) -> InRepeat:
+    """Return how often the start of a repeat is carried out, as a second person says yes to it: to all its
+    cells at once, until it is closed again."""
+    opened = record.repeat.opened
+    return InRepeat(
+        repeat=opened.repeat,
+        closings=record.repeat.closings,
+        times=opened.times,
+        grid=tuple((each.action, each.name, each.values) for each in opened.grid),
+        seed=opened.seed,
+        values=record.start.values,
     )
 
 

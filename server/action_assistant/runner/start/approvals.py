@@ -6,6 +6,7 @@ taken back, and says nothing about any other graph.
 """
 
 from collections import defaultdict, deque
+from collections.abc import Sequence
 from typing import Annotated, ClassVar, Final
 
 import anyio
@@ -13,10 +14,12 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, TooMany
 from action_assistant.kit.clock import ClockUs
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.start.orders import Ordered, OrderLine
 from action_assistant.runner.start.preflight import Item
 from action_assistant.umrf.facts import SECOND_PERSON
 from action_assistant.umrf.kept_values import as_json
@@ -33,6 +36,8 @@ _ASKED_AT_ONCE: Final = 20  # questions of one person for one robot, about diffe
 _PER_MINUTE: Final = 1  # of either, after that
 _QUESTIONS: Final = 20  # that are remembered of one graph
 _OPEN_US: Final = 86_400_000_000  # after which a question is no longer shown
+_LOOKED: Final = 500  # orders that are remembered in words
+_LOOKED_BYTES: Final = 8_000_000  # of the words of all of them
 
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -54,7 +59,9 @@ class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
 
 class ApprovalAsked(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The event that a person asks others for an approval of the graph or order with this digest, for
-    a start on these robots. `values`: those of the start. It lets nobody start anything."""
+    a start on these robots. `values`: those of the start; `order`: the whole of it in words, by the
+    runner's own look, without any where that look is not known; `tree_digest`: of its version. It
+    lets nobody start anything."""
 
     kind: ClassVar[str] = "approval.asked.v1"
 
@@ -66,6 +73,8 @@ class ApprovalAsked(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     graph: str | None = None
     version: str = ""
     values: StartValues = {}
+    order: tuple[OrderLine, ...] = ()
+    tree_digest: str = ""
 
 
 class ApprovalQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -105,6 +114,9 @@ class Approvals:
         )
         self._reading = anyio.Lock()
         self._asked: dict[tuple[str, str], ApprovalAsked] = {}
+        self._looked: LruCache[tuple[str, str | None], tuple[str, tuple[OrderLine, ...]]] = (
+            LruCache(_LOOKED, _LOOKED_BYTES)
+        )
         self._given_pace = TokenBuckets(_GIVEN_AT_ONCE, _PER_MINUTE / 60)
         self._asked_pace = TokenBuckets(_ASKED_AT_ONCE, _PER_MINUTE / 60)
 
@@ -152,7 +164,9 @@ class Approvals:
         for robot in dict.fromkeys(question.robots):
             if not self._asked_pace.of(f"{author.id} {robot}").take():
                 raise TooMany(f"You have asked others very often about {robot}; wait some minutes.")
-        asked = ApprovalAsked(at=now, author=author, **msgspec.structs.asdict(question))
+        tree, lines = self._looked.get((question.digest, question.graph)) or ("", ())
+        fields = msgspec.structs.asdict(question)
+        asked = ApprovalAsked(at=now, author=author, order=lines, tree_digest=tree, **fields)
         self._asked = {k: v for k, v in self._asked.items() if now - v.at < _ASKED_US}
         self._asked[key] = asked
         try:
@@ -161,6 +175,14 @@ class Approvals:
             self._asked.pop(key, None)
             raise
         return asked
+
+    def remember(self, order: Ordered, graph: str | None) -> tuple[OrderLine, ...]:
+        """Remember the words of an order of this graph that a person has looked at, for a question about
+        it, and return them."""
+        lines = order.lines
+        weight = sum(len(each.text) for each in lines)
+        self._looked.put((order.digest, graph), (order.tree_digest, lines), weight)
+        return lines
 
     async def given_for(self, digest: str) -> tuple[ApprovalGiven, ...]:
         """Return the approvals of a graph, in order of time."""
@@ -188,15 +210,16 @@ class Approvals:
                 self._seq = events[-1].seq
 
     async def item(
-        self, robot: Registration, digest: str, starter: str, what: str = "this graph"
+        self, robot: Registration, orders: Sequence[str], starter: str, what: str = "this graph"
     ) -> Item | None:
         """Return the pre-flight item about approval; None where the robot asks for none. It passes
-        when somebody else than the starter has approved the graph with another browser than the one
-        of this request. Of a link for several people nobody knows how many use it: who came by one
-        is no second person (decision 126). `what`: the thing with this digest, in words."""
+        when somebody else than the starter has approved one of these orders, by digest, with another
+        browser than the one of this request. Of a link for several people nobody knows how many use
+        it: who came by one is no second person (decision 126). `what`: the order in words."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
-        given = [each for each in await self.given_for(digest) if each.author.id != starter]
+        every = [each for digest in orders for each in await self.given_for(digest)]
+        given = [each for each in every if each.author.id != starter]
         named = [each for each in given if each.is_named is not False]
         here = caller.device()
         others = [each.author for each in named if not here or each.device != here]
@@ -217,10 +240,10 @@ class Approvals:
         return Item(code="approved", verdict="passed", text=f"{names} said yes to exactly {what}.")
 
     async def require(
-        self, robot: Registration, digest: str, starter: str, what: str = "this graph"
+        self, robot: Registration, orders: Sequence[str], starter: str, what: str = "this graph"
     ) -> None:
-        """Raise Conflict if the robot needs an approval of this graph, or order, and nobody but the
+        """Raise Conflict if the robot needs an approval of one of these orders, and nobody but the
         starter has given one. `what`: as for `item`."""
-        item = await self.item(robot, digest, starter, what)
+        item = await self.item(robot, orders, starter, what)
         if item is not None and item.verdict == "blocked":
             raise Conflict(item.text, where={"path": "/engine", "item": item.code})

@@ -1,9 +1,11 @@
-"""The order of a start: its claim to the rules of its robots, and the values to which a second person says
-yes. Pure."""
+"""The order of a start: its claim to the rules of its robots, and the whole of what a second person says
+yes to, as a digest and in words. Pure."""
 
 import hashlib
-from collections.abc import Collection
-from typing import Any
+import math
+from collections.abc import Callable, Collection, Iterator
+from datetime import UTC, datetime
+from typing import Any, Final, TypeAlias
 
 import msgspec
 import rfc8785
@@ -12,8 +14,13 @@ from action_assistant.errors import BadInput
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.start.admission import Prepared, StartRequest, Watching
+from action_assistant.safe_text import hold_names
+from action_assistant.umrf.breakpoints import Breakpoint
+from action_assistant.umrf.codes import CODES
 from action_assistant.umrf.json.text import pointer
-from action_assistant.umrf.limits import Limits
+from action_assistant.umrf.kept_values import as_json
+from action_assistant.umrf.limits import Limit, Limits
+from action_assistant.umrf.start_values import StartValues, Value
 
 
 def watched_in(watching: Watching, robots: Collection[str]) -> tuple[str, ...]:
@@ -41,17 +48,96 @@ def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
     )
 
 
-def order_of(
-    request: StartRequest, tree_digest: str, codes: Collection[str], limits: Limits
-) -> str:
-    """Return the digest of everything that a second person says yes to: the version (`tree_digest`), and
-    where there are any, the values, the robots of a led run with what happens when one is lost and the
-    script of what the simulator plays in it, the overridden `codes`, the `limits` in force on its robots,
-    its breakpoints, that its sub-graphs are opened, and where it begins: the record of an earlier run,
-    which is over, does not change. That of a start with nothing besides its graph is the tree digest."""
+class InQueue(msgspec.Struct, frozen=True):
+    """How often: once, as this entry of the queue, at the turn that has come at `ready_at`, µs UTC."""
+
+    entry: str
+    ready_at: int
+
+
+class InRepeat(msgspec.Struct, frozen=True, kw_only=True):
+    """How often: each cell of this repeat once, until it is closed again. `closings`: how often it was
+    closed; `values`: of all cells; `grid`: action, input and values in turn; `times`, `seed`: as in
+    `RepeatRequest`."""
+
+    repeat: str
+    closings: int
+    times: int
+    grid: tuple[tuple[str, str, tuple[Value, ...]], ...]
+    seed: int | None
+    values: StartValues
+
+
+#: How often a start is carried out; None: whenever a person starts exactly this.
+Often: TypeAlias = InQueue | InRepeat | None
+
+
+class OrderLine(msgspec.Struct, frozen=True):
+    """A part of an order in words. `what`: its name, as "Limit"; `text`: what it is."""
+
+    what: str
+    text: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
+
+
+class Ordered(msgspec.Struct, frozen=True):
+    """Everything that a second person says yes to: the version by its tree digest, and the other parts
+    of the order by name."""
+
+    tree_digest: str
+    parts: dict[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """The digest of the order. That of a start with nothing besides its graph is the tree digest."""
+        if not self.parts:
+            return self.tree_digest
+        return hashlib.sha256(rfc8785.dumps([self.tree_digest, self.parts])).hexdigest()
+
+    @property
+    def approving(self) -> tuple[str, ...]:
+        """The digests to which a yes covers this order: its own, and for an entry of the queue that of
+        each start of exactly this. A repeat has no other."""
+        whole = {name: part for name, part in self.parts.items() if name != "queue"}
+        return tuple(dict.fromkeys([self.digest, Ordered(self.tree_digest, whole).digest]))
+
+    @property
+    def lines(self) -> tuple[OrderLine, ...]:
+        """The order in words: two orders with other digests have other words."""
+        parts = self.parts
+        found = [OrderLine("Graph", f"the version with the digest {self.tree_digest}")]
+        if "repeat" not in parts and "queue" not in parts:
+            text = "each time that a person starts exactly this by itself; no repeat"
+            found.append(OrderLine("How often", text))
+        if "robots" not in parts:
+            text = "handed over whole to one robot, whichever asks for a second person"
+            found.append(OrderLine("Robots", text))
+        for name in _WORDS:
+            if name in parts:
+                found += [OrderLine(what, text) for what, text in _WORDS[name](parts[name])]
+        if "limits" not in parts:
+            found.append(OrderLine("Limits", "none in force"))
+        return tuple(found)
+
+
+def ordered(
+    request: StartRequest,
+    tree_digest: str,
+    codes: Collection[str],
+    limits: Limits,
+    often: Often = None,
+) -> Ordered:
+    """Return the order of a start: the version (`tree_digest`), and where there are any, the values, the
+    robots of a led run with what happens when one is lost and the script of what the simulator plays in
+    it, the overridden `codes`, the `limits` in force on its robots, its breakpoints, that its sub-graphs
+    are opened, where it begins (the record of an earlier run, which is over, does not change), and how
+    often it is carried out."""
     more: dict[str, Any] = {}
-    if request.values:
-        more["values"] = msgspec.to_builtins(request.values)
+    values = often.values if isinstance(often, InRepeat) else request.values
+    if values:
+        more["values"] = msgspec.to_builtins(values)
     if request.engine == CONDUCTED:
         more |= {"robots": request.robots, "lost": request.lost}
     if request.engine == CONDUCTED and SIMULATOR in request.robots.values() and request.script:
@@ -68,9 +154,133 @@ def order_of(
         more["breakpoints"] = msgspec.to_builtins(request.breakpoints)
     if request.levels != "one_step":
         more["levels"] = request.levels
-    if not more:
-        return tree_digest
-    return hashlib.sha256(rfc8785.dumps([tree_digest, more])).hexdigest()
+    match often:
+        case InQueue():
+            more["queue"] = msgspec.to_builtins(often)
+        case InRepeat():
+            more["repeat"] = {
+                name: each for name, each in msgspec.to_builtins(often).items() if name != "values"
+            }
+        case None:
+            pass
+    return Ordered(tree_digest, more)
+
+
+def order_of(
+    request: StartRequest, tree_digest: str, codes: Collection[str], limits: Limits
+) -> str:
+    """Return the digest of the order of a start that is carried out whenever a person starts exactly
+    this."""
+    return ordered(request, tree_digest, codes, limits).digest
+
+
+_Words: TypeAlias = Iterator[tuple[str, str]]
+
+
+def _text(value: object) -> str:
+    return as_json(value)
+
+
+def _of_values(values: dict[str, dict[str, Any]]) -> _Words:
+    for action, given in sorted(values.items()):
+        for name, value in sorted(given.items()):
+            yield "Value", f"{_text(name)} of {_text(action)} = {_text(value)}"
+
+
+def _of_robots(robots: dict[str, str]) -> _Words:
+    for actor, robot in sorted(robots.items()):
+        yield "Robot", f"{_text(actor) if actor else 'actions without a robot'}: {_text(robot)}"
+
+
+def _of_people(people: dict[str, str]) -> _Words:
+    for role, who in sorted(people.items()):
+        answers = f"the person or group {_text(who)}" if who else "whoever may run it"
+        yield "Answers", f"questions to {_text(role)}: {answers}"
+
+
+def _of_override(codes: list[str]) -> _Words:
+    for code in codes:
+        meaning = CODES[code].meaning if code in CODES else ""
+        yield "In spite of", f"{code}: {meaning}" if meaning else code
+
+
+def _of_limits(limits: dict[str, list[dict[str, Any]]]) -> _Words:
+    for robot, each in sorted(limits.items()):
+        for limit in msgspec.convert(each, list[Limit]):
+            of = f" of {_text(limit.action)}" if limit.action else ""
+            least = "" if limit.least is None else f", at least {_text(limit.least)}"
+            most = "" if limit.most is None else f", at most {_text(limit.most)}"
+            yield "Limit", f"{_text(robot)}: {_text(limit.parameter)}{of}{least}{most}"
+
+
+def _of_beginning(start: dict[str, Any]) -> _Words:
+    at = start.get("at") or ()
+    if not at:
+        yield "Begins", f"where run {_text(start.get('run', ''))} ended"
+    else:
+        only = "only" if start.get("only") else "from here on"
+        known = f", with the outcomes of run {_text(start['run'])}" if start.get("run") else ""
+        yield "Begins", f"{only}: {_text(at)}{known}"
+    for action, choice in sorted((start.get("choices") or {}).items()):
+        yield "Was under way", f"{_text(action)}: {choice}"
+    if start.get("reason"):
+        yield "Known because", start["reason"]
+
+
+def _of_breakpoints(breakpoints: list[dict[str, Any]]) -> _Words:
+    for each in msgspec.convert(breakpoints, list[Breakpoint]):
+        parts = [f"{'after' if each.is_at_end else 'before'} {_text(each.action)}"]
+        if each.inside:
+            parts.append(f"of the sub-graph {_text(each.inside)}")
+        if each.to:
+            parts.append(f"towards {_text(each.to)}")
+        if each.outcomes:
+            parts.append(f"if it ended {' or '.join(each.outcomes)}")
+        if each.visit:
+            parts.append(f"at visit {each.visit}")
+        if each.value is not None:
+            value = each.value
+            parts.append(f"if {_text(value.name)} {value.test} {_text(value.value)}")
+        yield "Waits", " ".join(parts)
+
+
+def _of_queue(queue: dict[str, Any]) -> _Words:
+    since = datetime.fromtimestamp(queue["ready_at"] / 1e6, UTC).isoformat()
+    yield "How often", f"once, at the turn of its entry {queue['entry']} that came at {since}"
+
+
+def _of_repeat(repeat: dict[str, Any]) -> _Words:
+    rounds = repeat["times"]
+    runs = rounds * math.prod(len(values) for _, _, values in repeat["grid"])
+    yield "How often", f"{runs} runs in {rounds} rounds, each by a press, until a doubt closes it"
+    for action, name, values in repeat["grid"]:
+        yield "In turn", f"{_text(name)} of {_text(action)} = each of {_text(values)}"
+    if repeat["seed"] is not None:
+        yield "Sequence", f"each round shuffled by the seed {repeat['seed']}"
+    yield "Repeat", f"{repeat['repeat']}, closed {repeat['closings']} times before this"
+
+
+_LOST: Final[dict[str, str]] = {
+    "stop": "the whole run is stopped",
+    "wait": "the run waits for a person",
+}
+#: The words of each part of an order, in the order in which people read them.
+_WORDS: Final[dict[str, Callable[[Any], _Words]]] = {
+    "repeat": _of_repeat,
+    "queue": _of_queue,
+    "values": _of_values,
+    "robots": _of_robots,
+    "lost": lambda lost: iter([("If a robot is lost", _LOST[lost])]),
+    "people": _of_people,
+    "override": _of_override,
+    "limits": _of_limits,
+    "from": _of_beginning,
+    "breakpoints": _of_breakpoints,
+    "levels": lambda _: iter([("Sub-graphs", "opened: each action inside is a step of its own")]),
+    "script": lambda text: iter(
+        [("Simulator", f"plays the script {hashlib.sha256(text.encode()).hexdigest()}")]
+    ),
+}
 
 
 def overridden_in(request: StartRequest) -> tuple[str, ...]:

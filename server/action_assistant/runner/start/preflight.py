@@ -34,6 +34,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.runner.start.built_libraries import older_libraries
+from action_assistant.runner.start.orders import OrderLine
 from action_assistant.runner.start.robot_graphs import not_matched, unseen_graphs
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.breakpoints import Breakpoint
@@ -77,8 +78,8 @@ class Preflight(msgspec.Struct, frozen=True):
     """The pre-flight of a graph on one engine. `override`: the codes that a person would have to
     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
     `tree_digest`: of it together with the graphs inside; `order_digest`: of all that a second person
-    says yes to, "" where nobody has to; `earlier`: what the start takes for granted, on the first engine
-    of it, null if it begins at the entry."""
+    says yes to, "" where nobody has to, and `order` that in words; `earlier`: what the start takes for
+    granted, on the first engine of it, null if it begins at the entry."""
 
     engine: str
     digest: str
@@ -88,6 +89,7 @@ class Preflight(msgspec.Struct, frozen=True):
     never: bool
     order_digest: str = ""
     earlier: EarlierShown | None = None
+    order: tuple[OrderLine, ...] = ()
 
 
 class Settled(msgspec.Struct, frozen=True):
@@ -136,12 +138,10 @@ def with_items(look: Preflight, warnings: Sequence[Item]) -> Preflight:
     return msgspec.structs.replace(look, items=(*look.items, *warnings))
 
 
-def with_order(look: Preflight, approval: Item, order: str) -> Preflight:
-    """Return a pre-flight with the item about the yes of a second person to the whole order, which has
-    this digest."""
-    items = (*look.items, approval)
+def with_approval(look: Preflight, approval: Item) -> Preflight:
+    """Return a pre-flight with the item about the yes of a second person."""
     never = look.never or approval.verdict == "blocked"
-    return msgspec.structs.replace(look, items=items, never=never, order_digest=order)
+    return msgspec.structs.replace(look, items=(*look.items, approval), never=never)
 
 
 def refusal_item(code: str, refused: Refused) -> Item:

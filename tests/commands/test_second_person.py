@@ -1,0 +1,55 @@
+"""The question for a second person's yes on the command line."""
+
+import json
+from pathlib import Path
+
+import httpx
+import pytest
+
+from support.product import TOKEN, running
+
+GRAPH = {
+    "graph_name": "pair",
+    "graph_entry": [{"name": "A"}],
+    "graph_exit": [{"name": "A"}],
+    "actions": [{"name": "A", "type": "sync"}],
+}
+
+
+@pytest.mark.usefixtures("new_interpreters")  # forks have no rclpy, so no robot for the check
+def test_who_is_asked_reads_the_order_in_words_and_says_yes_to_exactly_that(
+    tmp_path: Path,
+) -> None:
+    with (
+        running(tmp_path / "data") as product,
+        httpx.Client(
+            base_url=product.runner_url,
+            headers={"authorization": f"Bearer {TOKEN}"},
+            trust_env=False,
+            timeout=60,
+        ) as runner,
+    ):
+        robot = {"name": "David", "domain": 181, "profile": {"second_person": True}}
+        assert runner.post("/api/robots", json=robot).is_success
+        (tmp_path / "pair.json").write_text(json.dumps(GRAPH))
+        graph = product.cli("import", str(tmp_path / "pair.json")).stdout.split()[0]
+        asked = {"umrf": GRAPH, "engines": ["David"], "graph": graph}
+        (look,) = runner.post("/api/preflight", json=asked).json()
+        digest = look["order_digest"]
+
+        def ask(digest: str) -> None:
+            question = {"digest": digest, "robots": ["David"], "graph_name": "x", "graph": graph}
+            assert runner.post("/api/approvals/asked", json=question).status_code == 202
+
+        ask(digest)
+        ask("a" * 64)
+        lines = product.cli("runs", "second-person", graph).stdout.splitlines()
+        assert f"  Graph: the version with the digest {look['tree_digest']}" in lines
+        assert any(line.startswith("  How often: each time that a person starts") for line in lines)
+        unknown = product.cli("runs", "second-person", graph, "--yes", "a" * 12)
+        assert "not known in words" in unknown.stderr
+        assert product.cli("runs", "second-person", graph, "--yes", "b" * 12).returncode != 0
+        said = product.cli("runs", "second-person", graph, "--yes", digest[:12])
+        assert said.returncode == 0, said.stderr
+        given = runner.get("/api/approvals", params={"digest": digest}).json()
+        assert len(given) == 1
