@@ -3685,6 +3685,14 @@ export interface RunnerPaths {
     "/api/runs/{run}/events": {
         get: RunnerOperations["followRun"];
     };
+    "/api/approvals": {
+        get: RunnerOperations["listApprovals"];
+        post: RunnerOperations["approve"];
+    };
+    "/api/approvals/asked": {
+        get: RunnerOperations["listAskedApprovals"];
+        post: RunnerOperations["askApproval"];
+    };
     "/api/robots": {
         get: RunnerOperations["listRobots"];
         post: RunnerOperations["registerRobot"];
@@ -3770,14 +3778,6 @@ export interface RunnerPaths {
     "/api/releases/{version}": {
         put: RunnerOperations["storeRelease"];
         delete: RunnerOperations["dropRelease"];
-    };
-    "/api/approvals": {
-        get: RunnerOperations["listApprovals"];
-        post: RunnerOperations["approve"];
-    };
-    "/api/approvals/asked": {
-        get: RunnerOperations["listAskedApprovals"];
-        post: RunnerOperations["askApproval"];
     };
     "/api/expectations": {
         get: RunnerOperations["listExpectations"];
@@ -4566,6 +4566,62 @@ interface RunnerOperations {
             };
         };
     };
+    listApprovals: {
+        parameters: {
+            query: {
+                digest: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Approval"][];
+                };
+            };
+        };
+    };
+    approve: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ApprovalRequest"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["Approval"];
+                };
+            };
+        };
+    };
+    listAskedApprovals: {
+        parameters: {
+            query: {
+                graph: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ApprovalWanted"][];
+                };
+            };
+        };
+    };
+    askApproval: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ApprovalQuestion"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["AskedOthers"];
+                };
+            };
+        };
+    };
     listRobots: {
         responses: {
             200: {
@@ -5044,62 +5100,6 @@ interface RunnerOperations {
         };
         responses: {
             204: {
-            };
-        };
-    };
-    listApprovals: {
-        parameters: {
-            query: {
-                digest: string;
-            };
-        };
-        responses: {
-            200: {
-                content: {
-                    "application/json": RunnerApi["Approval"][];
-                };
-            };
-        };
-    };
-    approve: {
-        requestBody: {
-            content: {
-                "application/json": RunnerApi["ApprovalRequest"];
-            };
-        };
-        responses: {
-            201: {
-                content: {
-                    "application/json": RunnerApi["Approval"];
-                };
-            };
-        };
-    };
-    listAskedApprovals: {
-        parameters: {
-            query: {
-                graph: string;
-            };
-        };
-        responses: {
-            200: {
-                content: {
-                    "application/json": RunnerApi["ApprovalWanted"][];
-                };
-            };
-        };
-    };
-    askApproval: {
-        requestBody: {
-            content: {
-                "application/json": RunnerApi["ApprovalQuestion"];
-            };
-        };
-        responses: {
-            202: {
-                content: {
-                    "application/json": RunnerApi["AskedOthers"];
-                };
             };
         };
     };

@@ -24,6 +24,7 @@ from action_assistant.runner.analysis.course_checks import (
 )
 from action_assistant.runner.analysis.expected_runs import Expect, Expectation
 from action_assistant.runner.api import (
+    approvals,
     led_runs,
     questions,
     queues,
@@ -56,7 +57,6 @@ from action_assistant.runner.queues.entry import request_of
 from action_assistant.runner.review import audit_facts
 from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
-from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.runs.sight import run_graphs
 from action_assistant.runner.start.admission import (
@@ -65,14 +65,8 @@ from action_assistant.runner.start.admission import (
     decoded,
     read_request,
 )
-from action_assistant.runner.start.approvals import (
-    ApprovalGiven,
-    ApprovalQuestion,
-    ApprovalRequest,
-)
-from action_assistant.runner.start.orders import OrderLine, engines_of
+from action_assistant.runner.start.orders import engines_of
 from action_assistant.umrf.semantics import Script
-from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.audit.events import OwnerDid, StartRefused
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
@@ -83,7 +77,6 @@ from action_assistant.web.auth.access import (
     person_of,
     refuse,
     require,
-    session_of,
 )
 from action_assistant.web.auth.caller import client_network
 from action_assistant.web.auth.graph_seals import Statement
@@ -116,9 +109,9 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *repeats.routes(services),
         *queues.routes(services),
         *_queries(services),
+        *approvals.routes(services),
         *robots.routes(services),
         *rights.routes(services),
-        *_approvals(services),
         *_expected_courses(services),
         *_course_checks(services),
         *review.routes(services),
@@ -497,126 +490,6 @@ async def _tail(
         if anyio.current_time() >= alive_at:
             alive_at = anyio.current_time() + _ALIVE_S
             yield b": alive\n\n"
-
-
-class Approval(msgspec.Struct, frozen=True, kw_only=True):
-    """A person's yes to exactly the graph with this digest."""
-
-    digest: str
-    author: Author
-    at: datetime
-    graph: str | None
-    version: str
-    note: str
-
-
-class ApprovalWanted(msgspec.Struct, frozen=True, kw_only=True):
-    """A person's question for the yes of others to a start: `digest` is that of its whole order, and
-    `order` says all of it in words, by a look of the runner (nothing where that is not known);
-    `values` are those that it gives the graph, `tree_digest` is that of its version, "" if not known."""
-
-    digest: str
-    author: Author
-    at: datetime
-    robots: tuple[str, ...]
-    version: str
-    values: StartValues
-    order: tuple[OrderLine, ...]
-    tree_digest: str
-
-
-class AskedOthers(msgspec.Struct, frozen=True):
-    """The number of receivers to which the question is sent."""
-
-    receivers: int
-
-
-def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
-    @get(
-        "/api/approvals",
-        summary="The approvals of a graph, by its digest",
-        operation_id="listApprovals",
-        description="Of a start with values, overrides or several robots `digest` is the "
-        "`order_digest` of its pre-flight, which says the same in words (`order`), else the tree digest. "
-        "That of a repeat, or of a turn in the queue, comes with its own `look`.",
-        guards=[Needs("see")],
-    )
-    async def approvals(
-        request: _Asking,
-        digest: Annotated[str, Parameter(min_length=64, max_length=64)],
-    ) -> list[Approval]:
-        unseen = unseen_by(services, request)
-        given = await services.control.approvals.given_for(digest)
-        return [
-            _approval(each) for each in given if unseen is None or each.graph not in unseen.graphs
-        ]
-
-    @post(
-        "/api/approvals",
-        summary="Say yes to exactly one graph, so that somebody else may start it on robots that "
-        "demand a second person",
-        operation_id="approve",
-        guards=[PersonOnly(), Needs("operate")],
-    )
-    async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
-        services.control.sight.require_graphs(identity_of(request), data.graph)
-        session = session_of(request)
-        is_named = session is None or session.personal
-        return _approval(
-            await services.control.approvals.give(data, author_of(request), is_named=is_named)
-        )
-
-    @post(
-        "/api/approvals/asked",
-        status_code=202,
-        summary="Ask others for their yes to exactly one graph, where messages are sent",
-        operation_id="askApproval",
-        guards=[PersonOnly(), Needs("operate")],
-    )
-    async def ask(data: ApprovalQuestion, request: _Asking) -> AskedOthers:
-        services.control.sight.require_graphs(identity_of(request), data.graph)
-        await services.control.approvals.ask(data, author_of(request))
-        receivers = services.notifications.receivers
-        return AskedOthers(sum("approval.asked" in each.kinds for each in receivers))
-
-    @get(
-        "/api/approvals/asked",
-        summary="For which starts of a graph people asked others for their yes within the last day, the "
-        "newest first",
-        operation_id="listAskedApprovals",
-        guards=[Needs("see")],
-    )
-    async def wanted(
-        request: _Asking, graph: Annotated[str, Parameter(max_length=100)]
-    ) -> list[ApprovalWanted]:
-        services.control.sight.require_graphs(identity_of(request), graph)
-        found = await services.control.approvals.questions_of(graph)
-        return [
-            ApprovalWanted(
-                digest=each.digest,
-                author=each.author,
-                at=views.time(each.at),
-                robots=each.robots,
-                version=each.version,
-                values=each.values,
-                order=each.order,
-                tree_digest=each.tree_digest,
-            )
-            for each in found
-        ]
-
-    return [approvals, approve, ask, wanted]
-
-
-def _approval(given: ApprovalGiven) -> Approval:
-    return Approval(
-        digest=given.digest,
-        author=given.author,
-        at=views.time(given.at),
-        graph=given.graph,
-        version=given.version,
-        note=given.note,
-    )
 
 
 def _expected_courses(services: RunnerServices) -> list[ControllerRouterHandler]:

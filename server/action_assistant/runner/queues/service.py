@@ -219,8 +219,7 @@ class Queues:
                 return known, False
             self._require_capacity(author)
             graph = await self._run_in_worker(graph_of, start)
-            unseen = Looked({})
-            look, seen = await self._look(start, unseen, identity)
+            look, seen = await self._look(start, Looked({}), identity)
             require_waitable(start, look.looks)
             entered = QueueEntered(
                 at=self._clock_us(),
