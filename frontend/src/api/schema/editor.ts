@@ -2383,7 +2383,7 @@ export interface EditorApi {
     };
     /**
      * Site
-     * @description One of several runners that one page leads. `name`: for people; `url`: without a slash at its
+     * @description A runner of a page that leads several. `name`: for people; `url`: without a slash at its
      *     end.
      */
     Site: {

@@ -56,7 +56,7 @@ class Entry:
 
     @property
     def often(self) -> InQueue | None:
-        """How often it is carried out: once at this turn; None before its turn."""
+        """The words of how often for a second person: once at this turn; None before its turn."""
         return None if self.ready_at is None else InQueue(self.id, self.ready_at)
 
     @property

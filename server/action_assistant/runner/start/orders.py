@@ -49,14 +49,14 @@ def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
 
 
 class InQueue(msgspec.Struct, frozen=True):
-    """How often: once, as this entry of the queue, at the turn that has come at `ready_at`, µs UTC."""
+    """A start that is carried out once, as this entry of the queue, at the turn that came at `ready_at`, µs UTC."""
 
     entry: str
     ready_at: int
 
 
 class InRepeat(msgspec.Struct, frozen=True, kw_only=True):
-    """How often: each cell of this repeat once, until it is closed again. `closings`: how often it was
+    """A start that is carried out once for each cell of this repeat, until that is closed again. `closings`: how often it was
     closed; `values`: of all cells; `grid`: action, input and values in turn; `times`, `seed`: as in
     `RepeatRequest`."""
 
@@ -83,7 +83,7 @@ class OrderLine(msgspec.Struct, frozen=True):
 
 
 class Ordered(msgspec.Struct, frozen=True):
-    """Everything that a second person says yes to: the version by its tree digest, and the other parts
+    """The order to which a second person says yes: the version by its tree digest, and the other parts
     of the order by name."""
 
     tree_digest: str
