@@ -233,11 +233,11 @@ function Wanted(props: { graph: string; question: ApprovalWanted; me: string }) 
   const mine = given?.some((each) => each.author.id === me) ?? true;
   const isAnswered = given?.some((each) => each.author.id !== author.id);
   if (isAnswered && !mine) return null;
-  const who = isolated(author.name || "Somebody");
+  const who = author.name || "Somebody";
   return (
-    <section className={style.second} aria-label={`${who} asks for a second person`}>
+    <section className={style.second} aria-label={`${isolated(who)} asks for a second person`}>
       <Text size="sm">
-        {who} asks others for their yes, for {robots.map(isolated).join(", ")}:{" "}
+        {isolated(who)} asks others for their yes, for {robots.map(isolated).join(", ")}:{" "}
         {label === "" ? "a graph that is no version here" : isolated(label)}.
       </Text>
       <OrderWords order={order} />
@@ -256,7 +256,7 @@ function Wanted(props: { graph: string; question: ApprovalWanted; me: string }) 
           leftSection={<IconUserCheck size={14} aria-hidden />}
           onClick={() => say.mutate()}
         >
-          Say yes to exactly this, for {who} to start it
+          Say yes to exactly this, for {isolated(who)} to start it
         </Button>
       )}
       {say.error !== null && (
