@@ -135,14 +135,18 @@ function measure(): Measured {
   for (let node = walker.nextNode(); node; node = walker.nextNode()) {
     const element = node.parentElement;
     if (!element?.checkVisibility({ visibilityProperty: true, opacityProperty: true })) continue;
-    if (!node.textContent?.trim() || element.closest(".visually-hidden, svg, style, script"))
-      continue;
+    if (!node.textContent?.trim() || element.closest("svg, style, script")) continue;
     const range = document.createRange();
     range.selectNodeContents(node);
     const box = range.getBoundingClientRect();
     if (box.width < 2 || box.right < 0 || box.left > innerWidth || box.top > innerHeight) continue;
     const style = getComputedStyle(element);
-    const size = Number.parseFloat(style.fontSize) * (view?.contains(element) ? zoom : 1);
+    const around: CSSStyleDeclaration[] = [];
+    for (let each: Element | null = element; each; each = each.parentElement)
+      around.push(getComputedStyle(each));
+    if (around.some(({ clipPath }) => clipPath === "inset(50%)")) continue; // it is read out only
+    const scale = around.reduce((all, each) => all * (Number.parseFloat(each.scale) || 1), 1);
+    const size = Number.parseFloat(style.fontSize) * (view?.contains(element) ? zoom * scale : 1);
     if (size < 10.95) small.add(`${node.textContent} ${size}`);
     for (let holder: HTMLElement | null = element; holder; holder = holder.parentElement) {
       const look = getComputedStyle(holder);

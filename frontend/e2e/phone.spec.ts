@@ -1,7 +1,7 @@
 /** On a phone, with fingers only: a graph is made, connected, given a parameter, started, stopped. */
 
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { hold, saved } from "./canvas";
+import { boxOf, card, hold, saved, umrfOf } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();
@@ -94,6 +94,70 @@ test("a graph is made in the outline", async ({ browser }) => {
     input_parameters: { force: { pvf_value: "gentle" } },
     parents: [{ name: "Spot" }],
   });
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a graph opens with its outline, which says how its run goes; the device keeps the choice", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada", {
+    ...{ ...PHONE, panels: "folded" },
+  });
+  await page.goto(`${product.url}/graphs/${await product.chain(3)}`);
+  const row = (instance: number) =>
+    page.getByRole("row", { name: new RegExp(`^Wait ${instance}`) });
+  await expect(row(2)).toBeVisible();
+  await saved(page);
+  const tabs = page.getByRole("radiogroup");
+  const shift = tabs.boundingBox();
+  await press(page, page.getByRole("button", { name: /^Run v1 in the simulator/ }));
+  await expect(row(1)).toContainText("running");
+  await expect(page.getByRole("button", { name: /^Stop / })).toBeInViewport({ ratio: 1 });
+  await expect(row(2)).toContainText("true");
+  expect(await tabs.boundingBox()).toEqual(await shift);
+
+  await pane(page, "Canvas");
+  await expect(card(page, "Wait", 2)).toBeVisible();
+  await page.reload();
+  await expect(card(page, "Wait", 2)).toBeVisible();
+  await pane(page, "Outline");
+  await page.reload();
+  await expect(row(2)).toBeVisible();
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a phone draws a graph without places top-down, and alters it for nobody until a card is moved", async ({
+  browser,
+}) => {
+  const id = await product.chain(4);
+  const places = async () =>
+    (await umrfOf(product, id)).actions.map((action) => action.gui_attributes?.position);
+  const { page, context, failures } = await product.person(browser, "Ada", PHONE);
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  const [first, last] = [await boxOf(card(page, "Wait", 0)), await boxOf(card(page, "Wait", 3))];
+  expect(last.y).toBeGreaterThan(first.y + 3 * first.height);
+  expect(Math.abs(last.x - first.x)).toBeLessThan(first.width);
+  await expect(page.getByRole("button", { name: /^Run v1 in the simulator/ })).toBeEnabled();
+  expect(await places()).toEqual([undefined, undefined, undefined, undefined]);
+
+  const desk = await product.person(browser, "Mari");
+  await desk.page.goto(`${product.url}/graphs/${id}`);
+  await saved(desk.page);
+  await expect.poll(places).not.toContain(undefined);
+  const [from, to] = [
+    await boxOf(card(desk.page, "Wait", 0)),
+    await boxOf(card(desk.page, "Wait", 3)),
+  ];
+  expect(to.x).toBeGreaterThan(from.x + from.width);
+  // From now on it has places, and they hold for all.
+  await expect
+    .poll(
+      async () => (await boxOf(card(page, "Wait", 1))).y - (await boxOf(card(page, "Wait", 0))).y,
+    )
+    .toBeLessThan(first.height);
   expect(failures).toEqual([]);
   await context.close();
 });

@@ -192,7 +192,10 @@ export class Product {
  * where data is to be saved. That costs more than the first page, so in CI only those do who need it. */
 export type PersonOptions = Parameters<Browser["newContext"]>[0] & {
   loadsAhead?: boolean;
-  /** `open`: the person has the lists and the course of the run beside the canvas; else they are as at first. */
+  /**
+   * `open`: the person has the lists and the course of the run beside the canvas, and on a phone the canvas; else
+   * they are as at first.
+   */
   panels?: "open" | "folded";
 };
 
@@ -200,6 +203,8 @@ export type PersonOptions = Parameters<Browser["newContext"]>[0] & {
 function keepPanelsOpen(): void {
   for (const panel of ["aa.list-folded", "aa.strip-folded"])
     if (localStorage.getItem(panel) === null) localStorage.setItem(panel, "false");
+  if (localStorage.getItem("aa.phone-pane") === null)
+    localStorage.setItem("aa.phone-pane", JSON.stringify("canvas"));
 }
 
 function saveData(): void {

@@ -35,15 +35,15 @@ for (const [what, viewport, least] of [
 ] as const) {
   test(`a large graph opens at its beginning and readable on ${what}`, async ({ browser }) => {
     const { page, context } = await product.person(browser, "Ada", { viewport });
-    await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
+    await page.goto(`${product.url}/graphs/${await product.chain(150)}`);
     await saved(page);
     await expect.poll(() => zoom(page)).toBeCloseTo(least, 2);
     await expect(card(page, "Wait", 0)).toBeInViewport();
-    await expect(card(page, "Wait", 59)).not.toBeInViewport();
+    await expect(card(page, "Wait", 149)).not.toBeInViewport();
 
     // Fit shows all of it, also when it is pressed once more.
     await fitView(page);
-    await expect(card(page, "Wait", 59)).toBeInViewport({ ratio: 0.99 });
+    await expect(card(page, "Wait", 149)).toBeInViewport({ ratio: 0.99 });
     await expect(card(page, "Wait", 0)).toBeInViewport({ ratio: 0.99 });
     await expect.poll(() => zoom(page)).toBeLessThan(least);
     // Lines that are still being routed take room, too; once they are there Fit changes nothing.
@@ -69,6 +69,30 @@ test("Fit shows all of a graph also when it is pressed before the graph has plac
   await saved(page);
   await expect(card(page, "Wait", 79)).toBeInViewport({ ratio: 0.99 });
   await expect(card(page, "Wait", 0)).toBeInViewport({ ratio: 0.99 });
+  await context.close();
+});
+
+test("a graph of a screen opens whole, and is whole again when its run has ended", async ({
+  browser,
+}) => {
+  const viewport = { width: 1024, height: 768 };
+  const { page, context } = await product.person(browser, "Ada", { viewport, panels: "folded" });
+  await page.goto(`${product.url}/graphs/${await product.chain(5)}`);
+  await saved(page);
+  const isWhole = async () => {
+    for (const instance of [0, 4])
+      await expect(card(page, "Wait", instance)).toBeInViewport({ ratio: 0.99 });
+    await expect(page.getByLabel("End with")).toBeInViewport();
+  };
+  await isWhole();
+  // Zoomed in before, so that the view has to follow what runs.
+  for (let i = 0; i < 4; i += 1) await page.getByRole("button", { name: "Zoom in" }).click();
+  await expect(card(page, "Wait", 4)).not.toBeInViewport();
+  await start(page);
+  await expect(card(page, "Wait", 4)).toBeInViewport({ timeout: 30_000 });
+  await expect(card(page, "Wait", 0)).not.toBeInViewport();
+  await expect(page.getByText("finished").first()).toBeVisible({ timeout: 30_000 });
+  await isWhole();
   await context.close();
 });
 

@@ -18,6 +18,7 @@ import { useMay, usePerson } from "../api/people";
 import { type Run, useLastRun } from "../api/runs";
 import { EditorStoreProvider, useEditorStore } from "../canvas/editor-store";
 import { levelsOf } from "../canvas/level-path";
+import { STATE_LETTER } from "../canvas/zoom-detail";
 import { firstViewIsThere } from "../clock/first-view";
 import { serverNow } from "../clock/server-clock";
 import { scriptOf } from "../dry-run/script";
@@ -32,7 +33,7 @@ import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import type { Waits } from "../runs/sent-graph";
 import { StartControl, StartLook, useStartLook } from "../runs/start/start-control";
-import type { Unsure } from "../status/progress";
+import { type Unsure, useRunStatus } from "../status/progress";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
 import { useUnsure } from "../status/silence";
 import { roomUrl } from "../sync/room-connection";
@@ -223,6 +224,7 @@ function Inside({ id }: { id: string }) {
         }
         seed={seed}
         held={live?.ended_at === null && <Held run={live} past={past} />}
+        sign={<RunWord run={live} />}
         corner={<Corner run={live} whose={going.length > 1} />}
       />
       {mayStart && <StartLook graph={id} name={graph.name || "untitled"} look={look} />}
@@ -246,8 +248,13 @@ function Draft(props: Settled & Pick<ComponentProps<typeof DraftStatus>, "run" |
 }
 
 function Start({ settle, look }: Settled & Pick<ComponentProps<typeof StartControl>, "look">) {
-  const { id, graph, seq, obstacle, asks, compact, phone } = useEditorSummary();
-  const more = { asks: asks !== "" || graph.actions.some(isReadyMade), compact, thumb: phone };
+  const { id, graph, seq, obstacle, blocks, asks, compact, phone } = useEditorSummary();
+  const more = {
+    blocks,
+    asks: asks !== "" || graph.actions.some(isReadyMade),
+    compact,
+    thumb: phone,
+  };
   return <StartControl {...{ graph: id, seq, settle, obstacle, look, ...more }} />;
 }
 
@@ -283,6 +290,20 @@ function Strip(props: StripProps) {
   const { graph, selected, point, pick, folded, fold } = useEditorSummary();
   const shown = { graph, selected, point, onPick: pick, folded, onFold: fold };
   return <RunDrawer {...props} {...shown} />;
+}
+
+/** The word *Run* with the sign of the state in which the run is, on the tab of a phone. */
+function RunWord({ run }: { run: Run | null }) {
+  return run === null ? "Run" : <RunSign run={run} />;
+}
+
+function RunSign({ run }: { run: Run }) {
+  const { tone, word } = useRunStatus(run);
+  return (
+    <bdi className="run-sign" data-sign={STATE_LETTER[tone]} title={word}>
+      Run
+    </bdi>
+  );
 }
 
 /** Actions of people in the run, beside the canvas of a phone. */

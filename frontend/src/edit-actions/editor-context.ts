@@ -13,6 +13,7 @@ import {
   asOneEdit,
   isUndrawn,
   moveActions,
+  moveLoose,
   type NewAction,
   setEntry,
 } from "../graph/edit";
@@ -32,8 +33,8 @@ import {
 export interface AddRequest {
   /** The place on the screen, px. */
   readonly screen: Position;
-  /** The place on the canvas. */
-  readonly at: Position;
+  /** The place on the canvas; null where there is room, without a place of its own. */
+  readonly at: Position | null;
   readonly from: { readonly key: Key; readonly outcome: Precondition } | null;
   /** The arrow that takes the action in. */
   readonly into?: string;
@@ -195,7 +196,7 @@ export function writePositions(context: EditorContext, moved: ReadonlyMap<string
   const places = context.positions();
   const all = withContents(graph, moved, places, context.sizes());
   asOneEdit(doc, () => {
-    moveActions(doc, unplaced(graph, places));
+    moveLoose(doc, graph.direction, unplaced(graph, places));
     moveActions(doc, all);
     placeNotes(doc, graph, all);
   });
@@ -253,14 +254,20 @@ export function freePosition(context: EditorContext): Position {
 }
 
 /**
- * Adds an action by hand: everything else stays where it is drawn. The first one of a graph is what
+ * Adds an action by hand: everything else stays where it is drawn. Without a `position` it is drawn where there is
+ * room, as long as nobody moves it. The first one of a graph is what
  * the graph starts with. Returns its key.
  */
-export function addActionAt(context: EditorContext, action: NewAction, position: Position): Key {
+export function addActionAt(
+  context: EditorContext,
+  action: NewAction,
+  position: Position | null,
+): Key {
   return asOneEdit(context.doc, () => {
     const first = isUndrawn(context.doc);
-    moveActions(context.doc, unplaced(context.graph, context.positions()));
-    const key = addAction(context.doc, { ...action, position });
+    const { graph } = context;
+    moveLoose(context.doc, graph.direction, unplaced(graph, context.positions()));
+    const key = addAction(context.doc, { ...action, ...(position && { position }) });
     if (first) setEntry(context.doc, key);
     return key;
   });

@@ -70,6 +70,10 @@ export function commentIn(search: string): string | null {
   return new URLSearchParams(search).get("comment")?.split("/")[0] || null;
 }
 
+/** Return whether an address points at something within the graph, or asks for a panel. */
+export const pointsInside = (search: string): boolean =>
+  targetOf(search) !== null || commentIn(search) !== null || asksForHistory(search);
+
 const SEQ = /^[1-9]\d{0,14}$/;
 const RUN = /^run\/[\w-]{1,80}$/;
 

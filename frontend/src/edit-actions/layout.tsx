@@ -32,10 +32,14 @@ const followNotes = () =>
     return null;
   });
 
-/** Fresh places, with a notice that has a way out when it takes long; null when left or failed. */
+/**
+ * Fresh places, with a notice that has a way out when it takes long; null when left or failed. `wraps`: a long graph
+ * has several rows.
+ */
 export async function freshPlaces(
   graph: Graph,
   sizes: Sizes = estimatedSizes(graph),
+  wraps = true,
 ): Promise<Positions | null> {
   running?.abort();
   const mine = new AbortController();
@@ -55,7 +59,7 @@ export async function freshPlaces(
     });
   }, PATIENCE_MS);
   try {
-    return await layOut(graph, sizes, mine.signal);
+    return await layOut(graph, sizes, mine.signal, wraps);
   } catch (error) {
     if (!(error instanceof LayoutLeft)) sayNothingArranged(error);
     return null;

@@ -1,14 +1,13 @@
 /** The canvas with its tools and bars, and the hint on an empty canvas. */
 
-import { Button, Kbd, Skeleton } from "@mantine/core";
+import { Button, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
+import { IconFocus2 } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import { useSearch } from "wouter";
 import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
-import { firstViewIsThere } from "../clock/first-view";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import {
   asksForHistory,
@@ -27,9 +26,7 @@ import { FollowFrame } from "../people/people";
 import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
-import { Empty } from "../ui/empty";
 import { focusField } from "../ui/focus-field";
-import { useHasFingersOnly } from "../ui/hooks";
 import { AfterFirstView, boundedPart } from "../ui/lazy-part";
 import { useWatched } from "../ui/watched";
 import { EditableCanvas } from "./canvas/editable-canvas";
@@ -38,7 +35,8 @@ import { useFirstLayout } from "./canvas/use-first-layout";
 import { useUnfolding, useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { Toolbar, ZoomTools } from "./menus/toolbar";
-import type { EditorState } from "./use-editor";
+import { useFirstViewEnd } from "./panels/use-first-view-end";
+import { type EditorState, usePortrait } from "./use-editor";
 import type { Past } from "./use-past";
 
 const PastBar = boundedPart(() => import("../history/past-bar").then((part) => part.PastBar));
@@ -46,6 +44,10 @@ const DraftBar = boundedPart(() => import("../drafts/draft-bar").then((part) => 
   waiting: null,
 });
 const DryRunBar = boundedPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
+
+const EmptyHint = boundedPart(() => import("./empty-hint").then((part) => part.EmptyHint), {
+  waiting: null,
+});
 
 interface Props {
   me: string;
@@ -69,7 +71,6 @@ interface Props {
 
 /** Shows placeholders while the graph loads, and a hint while it is empty. */
 function EmptyCanvas({ waiting, context }: { waiting: boolean; context: EditorContext }) {
-  const fingers = useHasFingersOnly();
   if (waiting) {
     return (
       <div className={style.waiting} aria-busy="true">
@@ -79,38 +80,7 @@ function EmptyCanvas({ waiting, context }: { waiting: boolean; context: EditorCo
     );
   }
   if (context.graph.actions.length > 0 || context.past !== null) return null;
-  if (!context.mayEdit) {
-    return (
-      <div className={style.empty}>
-        <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
-          What others draw appears here. You can view this graph, not change it.
-        </Empty>
-      </div>
-    );
-  }
-  return (
-    <div className={style.empty}>
-      <Empty
-        icon={<IconRouteAltLeft size={22} />}
-        title="What shall be done first?"
-        action={
-          <Button variant="filled" onClick={() => context.openAdd()}>
-            Add an action
-          </Button>
-        }
-      >
-        {fingers
-          ? "Tap Add and type a name. Then tap an outcome of its card and the action that follows."
-          : "Double-click the canvas, or drag an action from the list. Then drag from an outcome to the action that follows."}
-        {!fingers && (
-          <>
-            {" "}
-            By keyboard: <Kbd>A</Kbd> adds, <Kbd>C</Kbd> draws an arrow.
-          </>
-        )}
-      </Empty>
-    </div>
-  );
+  return <EmptyHint context={context} />;
 }
 
 /** Shows the tools at the bottom left, the zoom at the right, and `children` above it. `phone`: there is room
@@ -154,7 +124,7 @@ function PaneInFlow(props: Props) {
   const isPast = context.past !== null || undefined;
   const { progress, marks, run } = isPast ? NOTHING_RUNS : props;
   const arrived = useLinkPart(({ seq }) => seq > 0);
-  const first = useFirstLayout(context, arrived, props.onPlacing);
+  const first = useFirstLayout(context, arrived, phone, props.onPlacing);
   const { selection, select, folded } = context;
   const canvas = useCanvasElements({
     graph: first.pending ? EMPTY_GRAPH : context.graph,
@@ -179,6 +149,7 @@ function PaneInFlow(props: Props) {
     opens: begun ? "cards" : arrived && !first.pending ? "ends" : "nothing",
     progress: isDryRun ? NOTHING : progress,
     run: isDryRun ? null : run,
+    aside: (isDryRun ?? isPast) === true,
     pointer,
   });
   const followed = useFollowedView({ flow, frame, view, onPanned });
@@ -242,7 +213,7 @@ const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
  */
 function useDrawnContext(seen: SeenPast | null): EditorContext {
   const context = useEditorContext();
-  const now = useGraph();
+  const now = usePortrait(useGraph());
   const graph = context.past === null ? now : (seen?.drawn ?? context.graph);
   return useMemo<EditorContext>(() => ({ ...context, graph }), [context, graph]);
 }
@@ -269,23 +240,6 @@ function PlaybackBar({ context, record, past }: PlaybackBarProps) {
       onSide={past.setSide}
     />
   );
-}
-
-/**
- * Lets the rest of the page come once the cards are on screen, or cannot come now. `drawn`: they are in the document.
- */
-function useFirstViewEnd(drawn: boolean): void {
-  const fails = useLinkPart(({ state }) => state === "offline" || state === "refused");
-  useEffect(() => {
-    if (fails) firstViewIsThere();
-  }, [fails]);
-  useEffect(() => {
-    if (!drawn) return;
-    let frame = requestAnimationFrame(() => {
-      frame = requestAnimationFrame(firstViewIsThere);
-    });
-    return () => cancelAnimationFrame(frame);
-  }, [drawn]);
 }
 
 /** Brings an action into view when it starts in a dry-run. */

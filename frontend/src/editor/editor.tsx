@@ -26,6 +26,7 @@ import {
   useEditorContext,
 } from "../edit-actions/editor-context";
 import { foldFrames } from "../edit-actions/folding";
+import { pointsInside } from "../edit-actions/graph-links";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
 import { useRenameGraph } from "../edit-actions/rename-graph";
 import type { NewAction } from "../graph/edit";
@@ -39,15 +40,14 @@ import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
 import { useIsPhone, useIsWide, useKept, useStableCallback } from "../ui/hooks";
-import { boundedPart, Later, useOnceIdle } from "../ui/lazy-part";
+import { AfterFirstView, boundedPart, Later, useOnceIdle } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
 import { TypingField } from "../ui/typed-ahead";
 import { CanvasPane } from "./canvas-pane";
 import { Overlays } from "./menus/overlays";
-import { DesktopLayout, DryRunButton, PhoneLayout } from "./panels/layouts";
+import { DesktopLayout, DryRunButton } from "./panels/layouts";
 import { usePanels } from "./panels/use-panels";
 import { blockWords, ProblemCount, useProblemGroups } from "./problem-count";
-import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useBreakpointMarks } from "./use-breakpoint-marks";
@@ -160,6 +160,9 @@ const DraftsHere = boundedPart(
 const Inspector = boundedPart(() =>
   import("../inspector/inspector").then((part) => part.Inspector),
 );
+const RoomNotices = boundedPart(() => import("./room-notices").then((part) => part.RoomNotices), {
+  waiting: null,
+});
 const LevelStatus = boundedPart(
   () => import("../levels/level-status").then((part) => part.LevelStatus),
   { waiting: null },
@@ -168,6 +171,10 @@ const PastDetails = boundedPart(() =>
   import("../history/past-details").then((part) => part.PastDetails),
 );
 const Outline = boundedPart(() => import("../outline/outline").then((part) => part.Outline));
+const PhoneLayout = boundedPart(
+  () => import("./panels/phone-layout").then((part) => part.PhoneLayout),
+  { waiting: null },
+);
 
 /** State of the editor for the parts that the page provides, such as those of runs. */
 interface EditorSummary {
@@ -177,6 +184,8 @@ interface EditorSummary {
   seq: number;
   /** The reason why this moment cannot be started; null if it can. */
   obstacle: string | null;
+  /** The counts of problems that keep it from being started, in words; "" without any. */
+  blocks: string;
   /** A start asks for values: `needs` those without which it cannot be; else it has them. */
   asks: "" | "may" | "needs";
   selected: string | null;
@@ -231,6 +240,8 @@ interface Props {
   begin: ReactNode;
   /** The notice of a run that waits for a person, for a phone: elsewhere the strip shows it. */
   held?: ReactNode;
+  /** The word *Run* with the state of the run, for a phone. */
+  sign: ReactNode;
   /** The moment of a run at which a dry-run shall start; null without one. */
   seed: DryRunSeed | null;
 }
@@ -272,6 +283,7 @@ function useSummary(
     place,
     seq: link.seq,
     obstacle: obstacleOf(context, link, checked, placing),
+    blocks: context.past === null ? blockWords(checked.told) : "",
     asks: checked.told.some(({ isAsked }) => isAsked)
       ? "needs"
       : context.graph.actions.some((action) => action.asks)
@@ -379,12 +391,12 @@ function usePreloaded(drawn: boolean): void {
 
 export function Editor(props: Props) {
   const { id, known, progress } = props;
-  const panels = usePanels();
+  const search = useSearch();
+  const panels = usePanels(pointsInside(search));
   const past = usePast();
   const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel, past);
   const link = useThrottledLink();
   const drawn = link.seq > 0;
-  const search = useSearch();
   const rename = useRenameGraph(context);
   const { problems, told, marks } = useProblemGroups(id, link.seq, context.graph);
   const threads = useThreads();
@@ -402,6 +414,9 @@ export function Editor(props: Props) {
   const begins = { beginning, endBeginning: editor.closeOverlay };
   const summary = useSummary(context, link, { seq: problems?.seq, told }, place, begins);
   const { compact, phone } = summary;
+  useEffect(() => {
+    if (phone) void Outline.preload(); // beside the layout, which shows it first
+  }, [phone]);
   const stage = (
     <CanvasPane
       me={props.me}
@@ -450,13 +465,18 @@ export function Editor(props: Props) {
       <EditorSummaryContext value={summary}>
         <props.Bar {...barParts(props, context, summary, told, search, rename)} />
         {phone ? (
-          <PhoneLayout {...parts} onCanvas={isDryOrPast} start={props.start} held={props.held} />
+          <PhoneLayout
+            {...{ ...parts, drawn, start: props.start, held: props.held, sign: props.sign }}
+            onCanvas={isDryOrPast}
+          />
         ) : (
           <DesktopLayout {...parts} wide={!compact} told={told} list={props.list} />
         )}
         {beginning !== null && props.begin}
       </EditorSummaryContext>
-      <RoomNotices />
+      <AfterFirstView>
+        <RoomNotices />
+      </AfterFirstView>
       <Later drawn={drawn}>
         <LateParts />
       </Later>

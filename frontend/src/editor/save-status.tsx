@@ -88,7 +88,7 @@ const signs = {
 };
 
 const DRAFTS_WHY =
-  "What you typed is not in the graph yet: it is not valid for its field, or you have not pressed its button.";
+  "What you typed is not in the graph yet: press Enter or leave its field, press its button, or mend what is not valid.";
 
 /** Return the number of drafts on this page that are not written to this graph. */
 function useDraftCounts(): DraftCounts {

@@ -3,6 +3,7 @@
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/people";
 import { useEditorStore } from "../canvas/editor-store";
+import { inPortrait } from "../canvas/geometry/portrait";
 import { CARD } from "../canvas/geometry/ranks";
 import { useDryRun } from "../dry-run/use-dry-run";
 import {
@@ -15,6 +16,7 @@ import {
   type Panel,
   type Tool,
 } from "../edit-actions/editor-context";
+import type { Graph } from "../graph/model";
 import {
   useLinkPart,
   useRoom,
@@ -22,7 +24,7 @@ import {
   useThrottledLink,
   useUndo,
 } from "../sync/use-room";
-import { useKept, useKeptKeys } from "../ui/hooks";
+import { useIsPhone, useKept, useKeptKeys } from "../ui/hooks";
 import { exportGraph } from "./export-graph";
 import { NO_PAST, type Past } from "./use-past";
 
@@ -62,10 +64,19 @@ export interface EditorState {
   closeFind(): void;
 }
 
+/** Return the graph as this screen draws it: on a phone one without places may be drawn top-down. */
+export function usePortrait(graph: Graph): Graph {
+  const phone = useIsPhone();
+  return useMemo(() => {
+    const { innerWidth, innerHeight } = window;
+    return phone ? inPortrait(graph, { width: innerWidth, height: innerHeight }) : graph;
+  }, [graph, phone]);
+}
+
 /** Return the graph and its document, and what this person may do with it. */
 function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   const { doc, undo } = useRoom();
-  const now = useThrottledGraph();
+  const now = usePortrait(useThrottledGraph());
   const undoable = useUndo();
   const role = useMay("edit");
   const mayRun = useMay("simulate");

@@ -18,7 +18,7 @@ import { useGraphsAsActions, useLibrary } from "../api/library";
 import { unplaced } from "../canvas/geometry/arrange";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { newAid, rootOf, splitKey } from "../graph/document-keys";
-import { asOneEdit, moveActions } from "../graph/edit";
+import { asOneEdit, moveLoose } from "../graph/edit";
 import {
   applyActionChanges,
   collisionsOfActions,
@@ -59,8 +59,9 @@ function makeActionEdit(context: EditorContext, changes: readonly DocumentChange
   const fresh = actionsOf(changes, ({ before }) => before === undefined);
   const middle = middleOf([...gone].flatMap((key) => within(places.get(key))));
   asOneEdit(doc, () => {
-    moveActions(
+    moveLoose(
       doc,
+      graph.direction,
       unplaced(graph, places).filter(([key]) => !gone.has(key)),
     );
     applyActionChanges(doc, changes);

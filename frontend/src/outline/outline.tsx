@@ -18,6 +18,7 @@ import { useIsPhone } from "../ui/hooks";
 import { keyOf } from "../ui/keys";
 import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
+import { useRunningRow } from "./follow-rows";
 import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
 import { PhoneRow } from "./phone-row";
@@ -100,6 +101,8 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   const [active, setActive] = useState<string>(() => chosen()?.id ?? ENTRY);
   const [edited, setEdited] = useState<Edited | null>(null);
   const tree = useRef<HTMLTableElement>(null);
+  const list = useRef<HTMLDivElement>(null);
+  useRunningRow(list, progress, phone);
   const at = Math.max(
     0,
     rows.findIndex(({ id }) => id === active),
@@ -204,11 +207,11 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   const add = () => {
     const middle: [number, number] = [window.innerWidth / 2, 120];
     if (!phone) return context.openAdd();
-    context.openAdd({ screen: middle, at: [0, 140 * graph.actions.length], from: null });
+    context.openAdd({ screen: middle, at: null, from: null });
   };
   const shown = { rows, at, selection, progress, edited, names, robots, others, mayEdit, handlers };
   return (
-    <div className={style.outline}>
+    <div className={style.outline} ref={list}>
       <div className={style.robots}>
         <RobotFilter />
       </div>

@@ -11,6 +11,8 @@ interface PendingDraft {
   readonly text: string;
   /** Writes it and drops it; null while it does not fit its field, or waits for a button. */
   readonly write: (() => void) | null;
+  /** It is written when its person presses Enter or leaves the field, not by itself. */
+  readonly held?: boolean;
 }
 
 /** Counts of drafts that will be written soon, and of drafts that wait for their person. */
@@ -79,7 +81,7 @@ class PendingDrafts {
 
   #changed(): void {
     const all = [...this.#drafts.values()];
-    const writing = all.filter(({ write }) => write !== null).length;
+    const writing = all.filter(({ write, held }) => write !== null && held !== true).length;
     const waiting = all.length - writing;
     this.#follow(all.length > 0);
     if (writing === this.#counts.writing && waiting === this.#counts.waiting) return;
@@ -192,7 +194,8 @@ export function useDraft(options: DraftOptions): DraftField {
       clearTimeout(timer.current);
       unwritten.current = text;
       if (text === latest.current.value) pendingDrafts.drop(latest);
-      else pendingDrafts.hold(latest, { text, write: isWrong(text) ? null : commit });
+      else
+        pendingDrafts.hold(latest, { text, write: isWrong(text) ? null : commit, held: onLeaving });
       if (!onLeaving) timer.current = setTimeout(commit, PAUSE_MS);
     },
     commit,

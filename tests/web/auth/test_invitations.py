@@ -189,6 +189,7 @@ def test_a_link_lets_in_with_its_role_and_the_owner_sees_who_came(
     guest = arrive(product)
     looked = guest.http.post("/api/session/invitation", json={"invitation": proof(invitation)})
     assert looked.json()["role"] == role
+    assert looked.json()["by"] == ""  # the server's token made it: nobody has chosen that name
     answer = guest.come(invitation)
     assert answer.json()["person"]["role"] == role
     assert guest.role == role

@@ -34,6 +34,8 @@ export class LineStore {
   private callOff = () => {};
   private busy = false;
   private waiting: Scene | null = null;
+  /** Called once, when the worker has routed the last scene. */
+  private readonly atRouted = new Set<() => void>();
   /** The time until which lines are not updated again, and the timer that updates them then. */
   private restsUntil = 0;
   private resting: ReturnType<typeof setTimeout> | undefined;
@@ -115,6 +117,12 @@ export class LineStore {
     for (const { points } of this.lines.values()) yield* points;
   }
 
+  /** Resolves when all lines are routed; never if the canvas closes before. */
+  whenRouted(): Promise<void> {
+    if (!this.busy) return Promise.resolve();
+    return new Promise((resolve) => this.atRouted.add(resolve));
+  }
+
   get offset(): number | null {
     return this.scene?.offset ?? null;
   }
@@ -138,6 +146,7 @@ export class LineStore {
     this.worker = null;
     this.busy = false;
     this.waiting = null;
+    this.atRouted.clear();
     this.scene = null;
     this.given = null;
     this.dragged = null;
@@ -187,7 +196,9 @@ export class LineStore {
       this.refresh([...data.changed.map(({ id }) => id), ...data.gone]);
       const next = this.waiting;
       this.waiting = null;
-      if (next) this.send(next);
+      if (next) return this.send(next);
+      for (const resolve of this.atRouted) resolve();
+      this.atRouted.clear();
     });
     return worker;
   }

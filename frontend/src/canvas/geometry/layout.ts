@@ -9,7 +9,7 @@ import type { Positions, Sizes } from "./ranks";
 export class LayoutLeft extends Error {}
 
 interface Running {
-  place(graph: Graph, sizes: Sizes): Promise<Positions>;
+  place(graph: Graph, sizes: Sizes, wraps: boolean): Promise<Positions>;
   end(): void;
 }
 
@@ -34,19 +34,25 @@ async function begin(): Promise<Running> {
     }
   };
   return {
-    place: async (graph, sizes) => {
+    place: async (graph, sizes, wraps) => {
       const request = layoutRequest(graph, sizes);
-      return placesIn(request, await askTwice(request.root));
+      const { root } = request;
+      return placesIn(request, await askTwice(wraps ? root : (withoutWrapping(root) ?? root)));
     },
     end: () => elk.terminateWorker(),
   };
 }
 
 /**
- * Return new places for everything, in the direction of the graph. Rejects with `LayoutLeft` when
- * it is cancelled.
+ * Return new places for everything, in the direction of the graph. `wraps`: a long graph has several rows. Rejects
+ * with `LayoutLeft` when it is cancelled.
  */
-export async function layOut(graph: Graph, sizes: Sizes, signal?: AbortSignal): Promise<Positions> {
+export async function layOut(
+  graph: Graph,
+  sizes: Sizes,
+  signal?: AbortSignal,
+  wraps = true,
+): Promise<Positions> {
   begun ??= begin();
   const mine = begun;
   let leave = () => {};
@@ -60,7 +66,7 @@ export async function layOut(graph: Graph, sizes: Sizes, signal?: AbortSignal): 
     signal?.addEventListener("abort", leave, { once: true });
   });
   if (signal?.aborted) leave();
-  const answered = mine.then(({ place }) => place(graph, sizes));
+  const answered = mine.then(({ place }) => place(graph, sizes, wraps));
   // A worker that could not be loaded is loaded again the next time.
   mine.catch(() => {
     if (begun === mine) begun = null;

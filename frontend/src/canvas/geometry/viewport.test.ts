@@ -18,6 +18,13 @@ test("a graph is shown whole if its text is readable", () => {
   expect(view.zoom).toBe(1);
 });
 
+test("a graph opens whole as long as the names of its actions are readable", () => {
+  const wide = (width: number) => ({ x: 0, y: 0, width, height: 300 });
+  const free = room.width - 2 * AIR;
+  expect(firstViewport(wide(free / 0.45), room, [0, 0], 0.9, "right").zoom).toBeCloseTo(0.45);
+  expect(firstViewport(wide(free / 0.35), room, [0, 0], 0.9, "right").zoom).toBe(0.9);
+});
+
 test("a tall graph is shown from its top, centred and readable", () => {
   const view = firstViewport(tall, room, [400, -40], 0.75, "down");
   expect(view.zoom).toBe(0.75);

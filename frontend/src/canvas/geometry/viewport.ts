@@ -35,8 +35,10 @@ export interface CanvasArea {
 /** px on screen kept free around what is shown. */
 const AIR = 28;
 const TOOLS: Insets = { left: 0, top: 0, right: 0, bottom: 44 };
-/** The least zoom at which all text on cards has at least 11 px on a desktop, and names 9 px on a phone. */
+/** The least zoom at which all text on cards has at least 11 px on a desktop; on a phone, that of a large graph. */
 export const READABLE = { desktop: 0.9, phone: 0.6 } as const;
+/** The least zoom at which the names on cards, which have 11 px at any zoom, have room for eleven letters. */
+const NAMED = 0.4;
 const LEAST = 0.08;
 
 /** Return the part of the canvas that nothing covers. */
@@ -104,8 +106,8 @@ function offset(
 }
 
 /**
- * Return the viewport of a graph that has just opened: all of it if that is readable, else its
- * start at the least readable zoom with `entry` (the middle of the entry) in view.
+ * Return the viewport of a graph that has just opened: all of it if names are readable then, else its
+ * start at the zoom `least` with `entry` (the middle of the entry) in view.
  */
 export function firstViewport(
   box: Bounds,
@@ -115,7 +117,7 @@ export function firstViewport(
   direction: Direction,
 ): Viewport {
   const free = freeOf(room);
-  if (zoomFor(box, free) >= least) return wholeViewport(box, room);
+  if (zoomFor(box, free) >= Math.min(NAMED, least)) return wholeViewport(box, room);
   const right = direction === "right";
   const x = offset([box.x, box.width], [free.x, free.width], least, right ? box.x : entry[0]);
   const y = offset([box.y, box.height], [free.y, free.height], least, right ? entry[1] : box.y);

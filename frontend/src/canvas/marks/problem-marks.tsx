@@ -61,7 +61,7 @@ export function ProblemBadge({ mark, on }: { mark: ProblemMark; on: "card" | "ar
         )}
         {wrong === 0 && warnings > 0 && (
           <span className={style.badge} data-kind="warning">
-            <IconAlertTriangleFilled size={10} /> {warnings}
+            <IconAlertTriangleFilled size={10} /> {on === "card" && warnings}
           </span>
         )}
       </span>

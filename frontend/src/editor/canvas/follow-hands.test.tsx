@@ -18,15 +18,18 @@ const now = {
   current: { places: new Map([["far", [5_000, 0] as const]]), sizes: new Map() },
 };
 const NOTHING = new Map();
+const onEnd = vi.fn();
 
-function Canvas() {
+function Canvas({ run = "r", aside = false }: { run?: string | null; aside?: boolean }) {
   const frame = useRef<HTMLDivElement>(null);
-  useFollowRun({
-    ...{ flow, frame, now, run: "r", progress: NOTHING, blockOf: undefined },
-    glide: () => ({ duration: 0 }),
+  const { onPanned, onFollow, onChosen } = useFollowRun({
+    ...{ flow, frame, now, run, progress: NOTHING, blockOf: undefined },
+    ...{ aside, onEnd, glide: () => ({ duration: 0 }) },
   });
+  hands = { onPanned, onFollow, onChosen };
   return <div ref={frame} data-frame />;
 }
+let hands: Pick<ReturnType<typeof useFollowRun>, "onPanned" | "onFollow" | "onChosen">;
 
 let root: Root;
 let store: EditorStore;
@@ -40,6 +43,24 @@ const wait = () =>
     store.run.set(shown as ReturnType<typeof store.run.now>);
   });
 
+const draw = (run: string | null, aside = false) =>
+  act(() =>
+    root.render(
+      <EditorStoreProvider store={store}>
+        <Canvas run={run} aside={aside} />
+      </EditorStoreProvider>,
+    ),
+  );
+
+/** The run ends: the canvas is told first, as on the page. */
+function end(aside = false): void {
+  draw(null, aside);
+  act(() => {
+    const shown: unknown = { run: { id: "r", ended_at: "2026-01-01T10:00:00Z" }, at: null };
+    store.run.set(shown as ReturnType<typeof store.run.now>);
+  });
+}
+
 const rest = (ms: number) => act(() => void vi.advanceTimersByTime(ms));
 
 function point(kind: string, buttons: number): void {
@@ -50,15 +71,10 @@ function point(kind: string, buttons: number): void {
 beforeEach(() => {
   vi.useFakeTimers();
   setViewport.mockClear();
+  onEnd.mockClear();
   store = new EditorStore();
   root = createRoot(document.body.appendChild(document.createElement("div")));
-  act(() =>
-    root.render(
-      <EditorStoreProvider store={store}>
-        <Canvas />
-      </EditorStoreProvider>,
-    ),
-  );
+  draw("r");
   rest(60_000);
 });
 
@@ -89,4 +105,47 @@ test.each(ENDS)("the view rests while something is dragged, and goes there after
   expect(setViewport).toHaveBeenCalledOnce();
   rest(60_000);
   expect(setViewport).toHaveBeenCalledOnce();
+});
+
+test("all is shown once when the run has ended", () => {
+  end();
+  expect(onEnd).toHaveBeenCalledOnce();
+  draw(null);
+  rest(60_000);
+  expect(onEnd).toHaveBeenCalledOnce();
+});
+
+test("at the end of a run the view rests under a hand, and shows all after it", () => {
+  point("pointerdown", 1);
+  end();
+  rest(30_000);
+  expect(onEnd).not.toHaveBeenCalled();
+  point("pointerup", 0);
+  rest(6_000);
+  expect(onEnd).toHaveBeenCalledOnce();
+});
+
+test.each([
+  ["moves the view", () => hands.onPanned()],
+  ["zooms or goes to an action", () => hands.onChosen()],
+])("a person who %s keeps that view at the end of the run", (_, choose) => {
+  act(choose);
+  end();
+  rest(60_000);
+  expect(onEnd).not.toHaveBeenCalled();
+});
+
+test("whoever moves the view, and then follows the run again, sees all at its end", () => {
+  act(() => hands.onPanned());
+  act(() => hands.onFollow());
+  end();
+  expect(onEnd).toHaveBeenCalledOnce();
+});
+
+test("a run that ends behind a dry-run or the past moves nothing", () => {
+  draw(null, true);
+  end(true);
+  draw(null);
+  rest(60_000);
+  expect(onEnd).not.toHaveBeenCalled();
 });

@@ -216,12 +216,57 @@ interface Followed {
   progress: ReadonlyMap<Key, Progress>;
   /** The folded frame that hides each hidden element. */
   blockOf: ReadonlyMap<Key, string> | undefined;
+  /** Something else than the run is shown: a dry-run, or the past. */
+  aside: boolean;
+  /** Called when the run has ended, if the view has followed it to its end. */
+  onEnd: () => void;
   /** Returns the allowed duration of an animation; 0 if the person prefers no motion. */
   glide: (ms: number) => { duration: number };
 }
 
-/** Keeps running actions in view until the person moves the view; each run starts anew. */
-export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }: Followed) {
+/**
+ * Calls `onEnd` when a run has ended to whose end the view was the run's. Hands on the canvas are waited for.
+ * Returns a function for a view that the person has chosen: that one is kept.
+ */
+function useRunEnd(
+  { run, aside, onEnd }: Pick<Followed, "run" | "aside" | "onEnd">,
+  lost: boolean,
+  isBusy: () => boolean,
+) {
+  const { run: shown } = useEditorStore();
+  const ended = useWatched(shown, (now) =>
+    now?.run.ended_at == null || now.at !== null ? null : now.run.id,
+  );
+  const followed = useRef<string | null>(null);
+  useEffect(() => {
+    if (aside || lost) followed.current = null;
+    else if (run !== null) followed.current = run;
+  }, [run, aside, lost]);
+  useEffect(() => {
+    if (ended === null || run !== null) return;
+    let again: ReturnType<typeof setTimeout> | undefined;
+    const look = () => {
+      if (followed.current !== ended) return;
+      if (isBusy()) {
+        again = setTimeout(look, LOOK_AGAIN);
+        return;
+      }
+      followed.current = null;
+      onEnd();
+    };
+    look();
+    return () => clearTimeout(again);
+  }, [ended, run, isBusy, onEnd]);
+  return useCallback(() => {
+    followed.current = null;
+  }, []);
+}
+
+/**
+ * Keeps running actions in view until the person moves the view; each run starts anew. At its end all is shown.
+ */
+export function useFollowRun(given: Followed) {
+  const { flow, frame, now, run, progress, blockOf, glide } = given;
   const [left, setLeft] = useState<string | null>(null);
   const lost = run !== null && left === run;
   const store = useEditorStore();
@@ -239,6 +284,7 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
     );
   const key = followed().keys.join(" ");
   const { isBusy, release } = useHandsOn(frame);
+  const onChosen = useRunEnd(given, lost, isBusy);
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
   useEffect(() => {
     const room = frame.current;
@@ -263,7 +309,11 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
   return {
     /** True while a run goes on that the view no longer follows. */
     lost,
-    onPanned: useCallback(() => setLeft(run), [run]),
+    onPanned: useCallback(() => {
+      setLeft(run);
+      onChosen();
+    }, [run, onChosen]),
+    onChosen,
     onFollow: useCallback(() => {
       release();
       setLeft(null);

@@ -60,8 +60,10 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
   return [...named.filter(isFirst), ...fresh, ...graphs, ...described];
 }
 
-/** Return the upper left corner of the new card; an arrow leads to the middle of its input. */
-function cornerOf({ graph }: EditorContext, { at: [x, y], from }: AddRequest): Position {
+/** Return the upper left corner of the new card, null for none; an arrow leads to the middle of its input. */
+function cornerOf({ graph }: EditorContext, { at, from }: AddRequest): Position | null {
+  if (at === null) return null;
+  const [x, y] = at;
   return from !== null && graph.direction === "right"
     ? [x, y - Math.round(CARD.height / 2)]
     : [x - Math.round(CARD.width / 2), y];
@@ -98,7 +100,8 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
     const key = placed(context, request, template);
     context.select([key]);
     if (byKey) context.view.focus(key);
-    context.view.reveal(cornerOf(context, request));
+    const at = cornerOf(context, request);
+    if (at !== null) context.view.reveal(at);
     onClose();
   };
   const onKeyDown = (event: React.KeyboardEvent) => {

@@ -51,7 +51,7 @@ import type { Positions } from "../../canvas/geometry/ranks";
 import { arrowAt, pointOf } from "../../canvas/hit-test";
 import type { ProblemMarks } from "../../canvas/marks/problem-marks";
 import { notePlaces } from "../../canvas/notes/note-nodes";
-import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
+import { asOneEdit, insertInto, moveActions, moveLoose } from "../../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
 import type { Graph, Key, Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
@@ -306,7 +306,7 @@ function useDragging(
     if (begun.current !== null) {
       const dropped = withContents(graph, moved, rest, sizes);
       asOneEdit(doc, () => {
-        moveActions(doc, unplaced(graph, rest));
+        moveLoose(doc, graph.direction, unplaced(graph, rest));
         moveActions(doc, dropped);
         placeNotes(doc, graph, dropped);
         const [only] = all;

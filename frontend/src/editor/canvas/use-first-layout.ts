@@ -1,4 +1,4 @@
-/** Lays out a graph without any places, and writes them as one edit. */
+/** Lays out a graph without any places, and writes them as one edit; a phone keeps them to itself. */
 import { useEffect, useLayoutEffect, useRef, useState } from "react";
 import { arrange, isUnplaced } from "../../canvas/geometry/arrange";
 import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/layout";
@@ -20,10 +20,14 @@ interface FirstLayout {
   readonly busy: boolean;
 }
 
-/** Lays out an unplaced graph once. `onPlacing`: called with whether the edit is still to come. */
+/**
+ * Lays out an unplaced graph once. On a `phone` only its screen has the places, in one row or column. `onPlacing`:
+ * called with whether the edit is still to come.
+ */
 export function useFirstLayout(
   context: EditorContext,
   arrived: boolean,
+  phone: boolean,
   onPlacing: (placing: boolean) => void,
 ): FirstLayout {
   const unplaced = arrived && isUnplaced(context.graph);
@@ -52,13 +56,14 @@ export function useFirstLayout(
       plain.current = arrange(now.current.context.graph);
       setPlaces(plain.current);
     }, LAYOUT_PATIENCE_MS);
-    void freshPlaces(now.current.context.graph).then((found) => {
+    void freshPlaces(now.current.context.graph, undefined, !phone).then((found) => {
       clearTimeout(patience);
       if (!asked || gone.current) return;
       setPlaces(found ?? new Map());
       setFailed(found === null);
       if (found === null) return;
       if (plain.current !== null) requestAnimationFrame(() => now.current.context.view.reopen());
+      if (phone) return;
       const { context, people } = now.current;
       const earlier = people.filter(({ client }) => client < context.doc.clientID).length;
       const write = () => {
@@ -73,10 +78,10 @@ export function useFirstLayout(
       clearTimeout(timer);
       clearTimeout(patience);
     };
-  }, [loose]);
+  }, [loose, phone]);
   const pending = loose && places === null;
   const busy = pending || (loose && places === plain.current);
-  const placing = loose && context.mayEdit && !failed && context.graph.actions.length > 0;
+  const placing = loose && !phone && context.mayEdit && !failed && context.graph.actions.length > 0;
   // Before the first paint: Start must not be enabled for a moment only.
   useLayoutEffect(() => {
     onPlacing(placing);

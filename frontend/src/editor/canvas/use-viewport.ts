@@ -55,6 +55,9 @@ export function useUnfolding(context: EditorContext, canvas: FoldedCanvas) {
   return { blockOf: folding?.blockOf, unfoldRound };
 }
 
+/** `first`: as a graph opens. `whole`: all of it, however small it becomes. */
+type Goal = "first" | "whole";
+
 interface ViewportInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
@@ -75,6 +78,8 @@ interface ViewportInput {
   progress: ReadonlyMap<Key, Progress>;
   /** The id of the current run; null without one. */
   run: string | null;
+  /** Something else than the run is shown: a dry-run, or the past. */
+  aside: boolean;
   /** The place of the pointer over the canvas, on screen. */
   pointer: RefObject<Position | null>;
 }
@@ -139,32 +144,47 @@ export function useViewport(given: ViewportInput) {
   now.current = { places, sizes, direction };
   const least = phone ? READABLE.phone : READABLE.desktop;
 
-  // A fitted view is fitted again when the canvas changes its size, until somebody moves the view.
-  const fitted = useRef<{ view: Viewport; goal: "first" | "whole" } | null>(null);
-  const showAll = useCallback(
-    (goal: "first" | "whole", duration: number) => {
+  const viewOf = useCallback(
+    (goal: Goal): Viewport | null => {
       const { places, sizes, direction } = now.current;
       const pill = pillSize(direction);
       const all: Sizes = new Map([[ENTRY, pill], [EXIT, pill], ...sizes]);
       const [box, element] = [boundsOf(places, all, lines.points()), frame.current];
-      if (box === null || element === null) return;
+      if (box === null || element === null) return null;
       const room = roomOf(element);
+      if (goal === "whole") return wholeViewport(box, room);
       const [x, y] = places.get(ENTRY) ?? [box.x, box.y];
       const { width, height } = all.get(ENTRY) ?? pill;
-      const next =
-        goal === "whole"
-          ? wholeViewport(box, room)
-          : firstViewport(box, room, [x + width / 2, y + height / 2], least, direction);
-      fitted.current = { view: next, goal };
-      void flow.setViewport(next, glide(duration));
+      return firstViewport(box, room, [x + width / 2, y + height / 2], least, direction);
     },
-    [flow, frame, lines, least],
+    [frame, lines, least],
+  );
+  // A fitted view is fitted again when the canvas changes its size, until somebody moves the view.
+  const fitted = useRef<{ view: Viewport; goal: Goal } | null>(null);
+  const showAll = useCallback(
+    (goal: Goal, duration: number) => {
+      const go = (view: Viewport) => {
+        fitted.current = { view, goal };
+        return flow.setViewport(view, glide(duration));
+      };
+      const first = viewOf(goal);
+      if (first === null) return;
+      const shown = go(first);
+      const mine = fitted.current;
+      // Lines round cards are known later than the cards, and take room, too.
+      void Promise.all([shown, lines.whenRouted()]).then(() => {
+        const isStill = mine === fitted.current && isSameViewport(first, flow.getViewport());
+        const next = isStill ? viewOf(goal) : null;
+        if (next !== null && !isSameViewport(first, next)) void go(next);
+      });
+    },
+    [flow, lines, viewOf],
   );
 
   // The graph arrives after the canvas, and its sizes later still; a Fit that was pressed meanwhile
   // is remembered.
   const opened = useRef(false);
-  const asked = useRef<"first" | "whole">("first");
+  const asked = useRef<Goal>("first");
   useEffect(() => {
     if (!begun || opened.current) return;
     const timer = setTimeout(() => {
@@ -232,6 +252,12 @@ export function useViewport(given: ViewportInput) {
     [flow, frame, least],
   );
 
+  const showWhole = useCallback(() => showAll("whole", 300), [showAll]);
+  const follow = useFollowRun({
+    ...{ flow, frame, now, run, progress, blockOf, glide },
+    ...{ aside: given.aside, onEnd: showWhole },
+  });
+  const { onChosen } = follow;
   const view = useMemo<CanvasView>(
     () => ({
       fit: () => {
@@ -244,13 +270,16 @@ export function useViewport(given: ViewportInput) {
       },
       zoomIn: () => {
         fitted.current = null;
+        onChosen();
         void flow.zoomIn(glide(120));
       },
       zoomOut: () => {
         fitted.current = null;
+        onChosen();
         void flow.zoomOut(glide(120));
       },
       show: (keys, goal = "middle") => {
+        onChosen();
         unfoldRound(keys);
         show(keys, goal);
       },
@@ -287,13 +316,12 @@ export function useViewport(given: ViewportInput) {
         if (room !== null) focusCard(room, key, 12);
       },
     }),
-    [showAll, show, flow, frame, pointer, unfoldRound, toView],
+    [showAll, show, flow, frame, pointer, unfoldRound, toView, onChosen],
   );
 
-  const follow = useFollowRun({ flow, frame, now, run, progress, blockOf, glide });
   const onPanned = useCallback(() => {
     fitted.current = null;
     follow.onPanned();
   }, [follow.onPanned]);
-  return { view, ...follow, onPanned };
+  return { view, lost: follow.lost, onFollow: follow.onFollow, onPanned };
 }

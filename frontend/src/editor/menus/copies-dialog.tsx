@@ -4,7 +4,7 @@ import { useMemo, useState } from "react";
 import { usePerson } from "../../api/people";
 import { unplaced } from "../../canvas/geometry/arrange";
 import type { EditorContext } from "../../edit-actions/editor-context";
-import { asOneEdit, moveActions } from "../../graph/edit";
+import { asOneEdit, moveLoose } from "../../graph/edit";
 import {
   copiesWords,
   drawCopies,
@@ -56,7 +56,7 @@ function drawBeside(
   const places = context.positions();
   const by = freeShifts(context, keys, values.length, inSeries ? "along" : "across");
   return asOneEdit(doc, () => {
-    moveActions(doc, unplaced(graph, places));
+    moveLoose(doc, graph.direction, unplaced(graph, places));
     return drawCopies(doc, keys, varied, { values, inSeries, by, places });
   });
 }

@@ -3,7 +3,7 @@ import { Button, Checkbox, Group, Modal, NativeSelect } from "@mantine/core";
 import { useState } from "react";
 import { unplaced } from "../../canvas/geometry/arrange";
 import type { EditorContext } from "../../edit-actions/editor-context";
-import { asOneEdit, moveActions } from "../../graph/edit";
+import { asOneEdit, moveLoose } from "../../graph/edit";
 import {
   drawTries,
   type Failures,
@@ -35,7 +35,7 @@ function drawBeside(context: EditorContext, action: Key, times: number, failures
   const [x, y] = places.get(action) ?? context.view.middle();
   const by = freeShifts(context, new Set([action]), times - 1, "across");
   return asOneEdit(doc, () => {
-    moveActions(doc, unplaced(graph, places));
+    moveLoose(doc, graph.direction, unplaced(graph, places));
     return drawTries(doc, action, {
       failures,
       places: by.map(([dx, dy]) => [x + dx, y + dy] as const),

@@ -1,4 +1,4 @@
-/** Arranges the parts of the editor: one at a time on a phone, around the canvas elsewhere. */
+/** Arranges the parts of the editor around the canvas. A phone has phone-layout.tsx. */
 
 import { ActionIcon, Button } from "@mantine/core";
 import {
@@ -20,7 +20,7 @@ import { Segments } from "../../ui/segments";
 import { Tooltip } from "../../ui/tooltip";
 import { useWatched } from "../../ui/watched";
 import style from "./layouts.module.css";
-import type { Pane, Panels } from "./use-panels";
+import type { Panels } from "./use-panels";
 
 /** Starts or closes the dry-run. `stacked`: its icon stands above its word. */
 export function DryRunButton({ stacked = false }: { stacked?: boolean }) {
@@ -53,15 +53,8 @@ const SIDES: readonly { value: ListTab | "outline" | "history"; label: string }[
   { value: "history", label: "History" },
 ];
 
-const PANES: readonly { value: Pane; label: string }[] = [
-  { value: "canvas", label: "Canvas" },
-  { value: "outline", label: "Outline" },
-  { value: "history", label: "History" },
-  { value: "details", label: "Details" },
-  { value: "run", label: "Run" },
-];
-
-interface Parts {
+/** The parts of an editor, whatever their layout. */
+export interface Parts {
   panels: Panels;
   outline: ReactNode;
   history: ReactNode;
@@ -70,53 +63,6 @@ interface Parts {
   details: ReactNode;
   strip: ReactNode;
   status: ReactNode;
-}
-
-interface PhoneParts extends Parts {
-  /** A dry-run is open or the past is shown; both need the canvas. */
-  onCanvas: boolean;
-  start: ReactNode;
-  /** The notice of a run that waits for a person; the run's own pane shows it too. */
-  held: ReactNode;
-}
-
-export function PhoneLayout(props: PhoneParts) {
-  const { panels, outline, history, stage, find, details, strip, start, held, status, onCanvas } =
-    props;
-  const { pane, setPane } = panels;
-  useEffect(() => {
-    if (onCanvas) setPane("canvas");
-  }, [onCanvas, setPane]);
-  return (
-    <main className="column">
-      <Segments
-        className={style.segments ?? ""}
-        fullWidth
-        data={PANES}
-        value={pane}
-        onChange={setPane}
-      />
-      {pane !== "run" && held}
-      <div className="fill-y relative border-top">
-        {find}
-        {pane === "canvas" && stage}
-        {pane === "outline" && outline}
-        {pane === "history" && history}
-        {pane === "details" && <div className="column bg-panel">{details}</div>}
-        {pane === "run" && (
-          <div className="column bg-panel">
-            <div className={style.status}>{status}</div>
-            {strip}
-          </div>
-        )}
-      </div>
-      {/* Start is at the left and STOP at the right; Dry-run keeps them apart. */}
-      <div className={style.reach} role="toolbar" aria-label="Run">
-        {start}
-        <DryRunButton stacked />
-      </div>
-    </main>
-  );
 }
 
 /** Opens the lists over the canvas on a narrow screen, and closes the details. */

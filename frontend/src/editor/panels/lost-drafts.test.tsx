@@ -143,3 +143,17 @@ test("a person who has renamed a deleted action is told and can restore it", asy
   press("Restore it");
   expect(graphIn(doc).actions).toMatchObject([{ name: "DriveFast", inputs: [{ path: "speed" }] }]);
 });
+
+test("whoever restores an action is not asked once more about its other texts", async () => {
+  const place = `${textScope("g", "p")}comment/${drive}`;
+  keptTexts.set(place, "Mind the step");
+  type("Drives to the dock");
+  removeActions(colleague, [drive]);
+  hear();
+  expect(shown().match(/Restore it/g)).toHaveLength(2);
+  press("Restore it with the text");
+  await act(() => new Promise((resolve) => setTimeout(resolve)));
+  expect(shown()).not.toContain("Restore it");
+  expect(graphIn(doc).actions[0]?.description).toBe("Drives to the dock");
+  expect(keptTexts.get(place)).toBe("Mind the step");
+});

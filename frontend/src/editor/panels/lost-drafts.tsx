@@ -54,9 +54,12 @@ function Offer({ id, text, deleted, onRestore }: OfferProps) {
   );
 }
 
+const offerId = (deleted: Deleted | null, text: string | null) =>
+  `lost-${deleted?.key ?? "draft"}-${text ?? ""}`;
+
 /** Shows the notification. `name`: the deleted element, before the words. */
 function offer(name: string, words: string, props: Omit<OfferProps, "id">): void {
-  const id = `lost-${props.deleted?.key ?? "draft"}-${props.text ?? ""}`;
+  const id = offerId(props.deleted, props.text);
   notifications.hide(id);
   notifications.show({
     id,
@@ -87,9 +90,21 @@ export function LostDrafts() {
   const deletions = useMemo(() => new Deletions(doc, () => may.current), [doc]);
   useEffect(() => {
     deletions.open();
-    const restoring = (deleted: Deleted | null, then: () => void) => () => {
-      if (deleted !== null) deletions.restore(deleted.key);
-      then();
+    // One element may have lost several texts: whoever restores it is not asked about the others.
+    const offered = new Map<string, Map<string, () => void>>();
+    const restoring = (deleted: Deleted | null, text: string | null, then: () => void) => {
+      if (deleted === null) return then;
+      const { key } = deleted;
+      const all = offered.get(key) ?? new Map<string, () => void>();
+      offered.set(key, all.set(offerId(deleted, text), then));
+      return () => {
+        offered.delete(key);
+        deletions.restore(key);
+        for (const [id, write] of all) {
+          notifications.hide(id);
+          write();
+        }
+      };
     };
     const stops = [
       pendingDrafts.onLost((lost) => {
@@ -100,14 +115,14 @@ export function LostDrafts() {
         offer(deleted?.name ?? "", words, {
           text,
           deleted,
-          onRestore: restoring(deleted, () => void lost.write()),
+          onRestore: restoring(deleted, text, () => void lost.write()),
         });
       }),
       deletions.onRenamedMeanwhile((deleted) =>
         offer(deleted.name, "was deleted while it was renamed", {
           text: null,
           deleted,
-          onRestore: restoring(deleted, () => undefined),
+          onRestore: restoring(deleted, null, () => undefined),
         }),
       ),
       deletions.onDeleted((deleted) => {
@@ -115,7 +130,7 @@ export function LostDrafts() {
         const text = keptTexts.get(key);
         if (text === "") return;
         keptTexts.set(key, "");
-        const onRestore = restoring(deleted, () => keptTexts.set(key, text));
+        const onRestore = restoring(deleted, text, () => keptTexts.set(key, text));
         offer(deleted.name, "was deleted while you wrote a comment", { text, deleted, onRestore });
       }),
     ];

@@ -23,6 +23,7 @@ import {
   connect,
   insertInto,
   moveActions,
+  moveLoose,
   moveRelation,
   parametersFrom,
   placeFirst,
@@ -383,6 +384,17 @@ test("turning a graph and laying it out anew is one step of undo", () => {
   undo.redo();
   setDirection(doc, "down");
   expect(mapsOf(doc).meta.has("direction")).toBe(false);
+});
+
+test("elements without a place are written where and as they are drawn, else nothing is", () => {
+  const doc = new Y.Doc();
+  setDirection(doc, "right");
+  const key = addAction(doc, { name: "A" });
+  const now = () => readGraph(mapsOf(doc));
+  moveLoose(doc, "down", []);
+  expect(now().direction).toBe("right");
+  moveLoose(doc, "down", [[key, [0, 80]]]);
+  expect([now().direction, now().actions[0]?.position]).toEqual(["down", [0, 80]]);
 });
 
 test("the first layout of an import is no step of anybody's undo, and no undo takes it along", () => {

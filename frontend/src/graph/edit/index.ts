@@ -45,6 +45,8 @@ export function setGraphDescription(doc: Y.Doc, description: string): true {
 /** Says where what follows is drawn; down is what documents mean that say nothing. */
 export function setDirection(doc: Y.Doc, direction: Direction): void {
   asOneEdit(doc, () => {
+    const now = rootOf(doc, "meta").get("direction") === "right" ? "right" : "down";
+    if (now === direction) return;
     if (direction === "down") eraseKeys(doc, "meta", "direction");
     else writeKey(doc, "meta", "direction", direction);
   });
@@ -65,6 +67,22 @@ export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Posit
       if (old) moved.set(key, [x - old[0], y - old[1]]);
     }
     if (moved.size > 0) moveWaypoints(doc, moved);
+  });
+}
+
+/**
+ * Writes where elements without a place are drawn, with the direction in which they are drawn: before somebody
+ * moves one of them, so that the others stay.
+ */
+export function moveLoose(
+  doc: Y.Doc,
+  direction: Direction,
+  positions: readonly (readonly [Key, Position])[],
+): void {
+  if (positions.length === 0) return;
+  asOneEdit(doc, () => {
+    setDirection(doc, direction);
+    moveActions(doc, positions);
   });
 }
 

@@ -24,6 +24,8 @@ interface Props {
   settle: () => Promise<number>;
   /** The reason why this moment cannot be started; null when it can. */
   obstacle: string | null;
+  /** The counts of problems that are the reason, in words, for a badge; "" without any. */
+  blocks: string;
   /** The start asks for values, or its graph asks people and has to be led: it is looked at first. */
   asks: boolean;
   compact?: boolean;
@@ -80,7 +82,7 @@ function TwoLines({ first, second }: { first: string; second: string }) {
 }
 
 export function StartControl(props: Props) {
-  const { graph, seq, settle, obstacle, asks, compact = false, thumb = false } = props;
+  const { graph, seq, settle, obstacle, blocks, asks, compact = false, thumb = false } = props;
   const { engines, setAsking } = props.look;
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
@@ -110,6 +112,11 @@ export function StartControl(props: Props) {
     void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
   return (
     <span className={style.start} data-thumb={thumb || undefined}>
+      {blocks !== "" && (
+        <span className={style.badge} title={`${blocks}: this prevents a start`} aria-hidden>
+          {blocks}
+        </span>
+      )}
       {simulated && !asks ? (
         <StartButton
           icon={thumb ? undefined : icon}

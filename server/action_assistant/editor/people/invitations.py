@@ -212,7 +212,7 @@ class Invitations:
             raise Unauthenticated("This link is not known here any more. Ask for another one.")
         if link.revoked_at is not None or self._revoked.holds(invitation):
             raise Withdrawn("This link was revoked. Ask for another one.")
-        return Invited(invitation, link.role, self._people.person(link.made_by.id).name)
+        return Invited(invitation, link.role, self._people.inviter(link.made_by.id))
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Record the first time that a person comes in by an invitation. Raise Unavailable if the

@@ -375,7 +375,7 @@ class Members:
         if link not in self._owner_of:
             return None
         member, found = self._usable(link)
-        by = self._people.person(found.made_by.id).name
+        by = self._people.inviter(found.made_by.id)
         return Invited(link, member.role, by, member.name)
 
     async def come_in(self, link: str, session: str, browser: str, address: str) -> PersonFile:

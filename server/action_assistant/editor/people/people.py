@@ -16,7 +16,7 @@ from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.caller import caller
-from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.auth.keys import SERVER_OWNER, PersonRef
 
 _OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
 
@@ -55,6 +55,11 @@ class People:
     def person(self, author: str) -> PersonRef:
         """Return the id and name of the author of an event; the name is empty where it is unknown."""
         return PersonRef(author, self._names.get(author) or _OURS.get(author, ""))
+
+    def inviter(self, author: str) -> str:
+        """Return the name of a person who invites others; empty for the owner of the server's token,
+        who has chosen no name."""
+        return "" if author == SERVER_OWNER else self.person(author).name
 
     def everyone(self) -> list[PersonRef]:
         """Return all people, sorted by name."""

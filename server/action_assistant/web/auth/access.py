@@ -39,7 +39,7 @@ from action_assistant.web.auth.identity import (
     View,
     Views,
 )
-from action_assistant.web.auth.keys import Keys, Person, ScrapeToken, Session
+from action_assistant.web.auth.keys import SERVER_OWNER, Keys, Person, ScrapeToken, Session
 from action_assistant.web.auth.revocations import (
     SESSION_ENDED,
     Revocations,
@@ -274,7 +274,7 @@ class Access:
         self._policy = policy
         self._revoked = revoked
         self._leashes = SessionGuards(revoked, self._standing_while_open)
-        self._local = Person("local", _user_name(), OWNER)
+        self._local = Person(SERVER_OWNER, _user_name(), OWNER)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse, or pass on with `state.identity` set."""

@@ -37,6 +37,10 @@ class PersonRef(msgspec.Struct, frozen=True):
     name: str
 
 
+#: The id of whoever has the server's token. Its name is the user of the computer, which no person chose.
+SERVER_OWNER: Final = "local"
+
+
 class Person(PersonRef, frozen=True):
     """A person with a role, which says what they may do."""
 
