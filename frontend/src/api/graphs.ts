@@ -148,26 +148,6 @@ export function versionName(versions: readonly Version[] | undefined, id: string
   return version.label || `v${versions.length - at}`;
 }
 
-interface Moment {
-  readonly digest: string;
-  readonly tree: string | undefined;
-  readonly seq: number;
-}
-
-/**
- * Return the name of the newest version of another moment that has the same graph; "" for none. Comments and notes make
- * another version, too.
- */
-export function sameVersion(versions: readonly Version[], { digest, tree, seq }: Moment): string {
-  const isSame = (each: Version) =>
-    digest !== "" &&
-    each.digest === digest &&
-    (tree === undefined || each.tree_digest === tree) &&
-    each.seq !== seq;
-  const [newest] = versions.filter(isSame).sort((a, b) => b.seq - a.seq);
-  return newest === undefined ? "" : versionName(versions, newest.id);
-}
-
 export async function refreshGraphs(client: QueryClient): Promise<void> {
   await Promise.all([
     client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true }),

@@ -1,8 +1,7 @@
-/** Requests about past runs: marks, comparisons, statistics, files, notes, and the replay of a run. */
+/** Requests about past runs: marks, comparisons, statistics, files, and the replay of a run. */
 import { useQuery } from "@tanstack/react-query";
 import { runnerAt } from "./client";
 import { fetchAnswer, type RequestOptions } from "./http";
-import { sendPress } from "./presses";
 import { getRun } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -266,35 +265,5 @@ export function useReplayData(
         timeoutMs: 60_000,
       }),
     enabled: asked && runner !== undefined,
-  });
-}
-
-/** A note that somebody wrote for a moment of a run. */
-export type RunNote = RunnerApi["RunNote"];
-
-export function useRunNotes(runner: string | undefined, run: string) {
-  return useQuery({
-    queryKey: notesKey(run),
-    queryFn: ({ signal }) =>
-      runnerAt(runner).get("/api/runs/{run}/notes", { path: { run }, signal }),
-    enabled: runner !== undefined,
-  });
-}
-
-/** The key of the query for the notes of a run. */
-export const notesKey = (run: string) => ["runs", "notes", run] as const;
-
-/**
- * Adds a note for a moment, and returns all notes of the run. `moment`: null for its end, or now. Where
- * the answer got lost, the same text sent again is the same note.
- */
-export function addRunNote(
-  runner: string,
-  run: string,
-  note: { readonly text: string; readonly moment: string | null },
-): Promise<RunNote[]> {
-  return sendPress(`note ${run} ${note.text}`, (request) => {
-    const body = { ...note, request_id: request };
-    return runnerAt(runner).post("/api/runs/{run}/notes", { path: { run }, body, keepalive: true });
   });
 }

@@ -1,6 +1,6 @@
 import { expect, test, vi } from "vitest";
 import { giveOutcome, letGoOn, letWait } from "./presses";
-import { addRunNote } from "./review";
+import { addRunNote } from "./run-notes";
 import { abilitiesOf, currentAlarm, type Run } from "./runs";
 
 const alarm = (code: string, second: number) => ({

@@ -5,7 +5,8 @@ import { useMemo, useState } from "react";
 import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useCurrentName } from "../api/people";
-import { exportUrl, type ReplayMark, type RunNote, useRawEvents } from "../api/review";
+import { exportUrl, type ReplayMark, useRawEvents } from "../api/review";
+import type { RunNote } from "../api/run-notes";
 import { type Run, runPlace } from "../api/runs";
 import { placesOf, wayWords } from "../status/level-places";
 import {

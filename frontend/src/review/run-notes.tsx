@@ -5,7 +5,7 @@ import { useRef, useState } from "react";
 import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { usePerson } from "../api/people";
-import { addRunNote, notesKey, type RunNote } from "../api/review";
+import { addRunNote, notesKey, type RunNote } from "../api/run-notes";
 import type { Run } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import type { TimeSign } from "../status/lanes/timeline";

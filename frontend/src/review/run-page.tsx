@@ -10,13 +10,8 @@ import { errorText } from "../api/http";
 import { CONDUCTED } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
-import {
-  type ReplayMark,
-  type RunNote,
-  useReplayData,
-  useRunNotes,
-  useRunsOfSameStart,
-} from "../api/review";
+import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../api/review";
+import { type RunNote, useRunNotes } from "../api/run-notes";
 import { type Run, useRun } from "../api/runs";
 import { EditorStore, EditorStoreProvider } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";

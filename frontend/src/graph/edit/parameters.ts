@@ -13,7 +13,6 @@ import {
   rootOf,
 } from "../document-keys";
 import type { JsonText, Key, Parameter } from "../model";
-import type { Bounds } from "../parameters/asked-inputs";
 import { remapFor, type Tie } from "../parameters/output-choices";
 import { asJsonText } from "../values";
 import { asOneEdit, eraseKeys, graphNow, hasAction, writeKey } from "./document-writes";
@@ -177,17 +176,6 @@ export function leaveOutputs(doc: Y.Doc, key: Key, paths: readonly string[]): bo
   if (found.length === 0) return false;
   asOneEdit(doc, () => {
     for (const { id, source } of found) setRemap(doc, id, source, null);
-  });
-  return true;
-}
-
-/** Sets whether, and within which bounds, a start asks for an input. False when that is gone. */
-export function setAsk(doc: Y.Doc, key: Key, path: string, bounds: Bounds | null): boolean {
-  const isThere = hasAction(doc, key) && rootOf(doc, "actions").has(parameterKey(key, "in", path));
-  if (!isThere) return false;
-  asOneEdit(doc, () => {
-    if (bounds === null) eraseKeys(doc, "actions", askKey(key, path));
-    else writeKey(doc, "actions", askKey(key, path), JSON.stringify(bounds));
   });
   return true;
 }

@@ -14,7 +14,7 @@ import {
   setRequired,
   undoOf,
 } from ".";
-import { setAsk } from "./parameters";
+import { setAsk } from "./asks";
 import { drawTries, type Failures, triesWords, whyNoTries } from "./tries";
 
 const places = (times: number) => Array.from({ length: times - 1 }, (_, i) => [0, i] as const);

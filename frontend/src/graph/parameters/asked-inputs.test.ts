@@ -11,7 +11,7 @@ import {
   setParameter,
   undoOf,
 } from "../edit";
-import { setAsk } from "../edit/parameters";
+import { setAsk } from "../edit/asks";
 import { askedPaths, askOf } from "./asked-inputs";
 import { withValue } from "./values";
 

@@ -5,7 +5,7 @@ import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
-import { sameVersion, useVersions } from "../../api/graphs";
+import { useVersions } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
@@ -45,6 +45,7 @@ import {
 import { PreflightList } from "./preflight-list";
 import { mayWait, QueueOffer } from "./queue-choice";
 import { useOpenRepeat, useRepeatChoice } from "./repeat-choice";
+import { sameVersion } from "./same-version";
 import { useAllBreakpoints, useBreakpoints } from "./start-breakpoints";
 import { StartButton } from "./start-button";
 import style from "./start-dialog.module.css";

@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
-import { sameVersion, type Version } from "./graphs";
+import type { Version } from "../../api/graphs";
+import { sameVersion } from "./same-version";
 
 const version = (id: string, seq: number, digest: string, tree_digest = `tree ${digest}`) =>
   ({ id, seq, digest, tree_digest, label: "", at: "2026-01-01T00:00:00Z" }) as unknown as Version;
