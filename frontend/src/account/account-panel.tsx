@@ -15,12 +15,19 @@ import {
   IconHelp,
   IconLogout,
   IconMoon,
+  type IconProps,
   IconServerCog,
   IconShare,
   IconSun,
   IconTerminal2,
 } from "@tabler/icons-react";
-import { type ButtonHTMLAttributes, cloneElement, type ReactElement, useState } from "react";
+import {
+  type ButtonHTMLAttributes,
+  type ComponentType,
+  cloneElement,
+  type ReactElement,
+  useState,
+} from "react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
@@ -48,6 +55,28 @@ function Appearance() {
       </Text>
       <Segments fullWidth size="xs" data={schemes} value={colorScheme} onChange={setColorScheme} />
     </div>
+  );
+}
+
+interface WayProps {
+  to: string;
+  Sign: ComponentType<IconProps>;
+  onClose: () => void;
+  children: string;
+}
+
+/** A button that leads to a page of its own. */
+function Way({ to, Sign, onClose, children }: WayProps) {
+  return (
+    <Button
+      component={Link}
+      to={to}
+      variant="default"
+      leftSection={<Sign size={15} aria-hidden />}
+      onClick={onClose}
+    >
+      {children}
+    </Button>
   );
 }
 
@@ -130,45 +159,21 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
             Share with others …
           </Button>
         )}
-        <Button
-          component={Link}
-          to="/programs"
-          variant="default"
-          leftSection={<IconTerminal2 size={15} aria-hidden />}
-          onClick={onClose}
-        >
+        <Way to="/programs" Sign={IconTerminal2} onClose={onClose}>
           Programs
-        </Button>
-        <Button
-          component={Link}
-          to="/people"
-          variant="default"
-          leftSection={<IconDevices size={15} aria-hidden />}
-          onClick={onClose}
-        >
+        </Way>
+        <Way to="/people" Sign={IconDevices} onClose={onClose}>
           {mayShare ? "People and devices" : "Your devices"}
-        </Button>
+        </Way>
         {mayLook && (
-          <Button
-            component={Link}
-            to="/admin"
-            variant="default"
-            leftSection={<IconServerCog size={15} aria-hidden />}
-            onClick={onClose}
-          >
+          <Way to="/admin" Sign={IconServerCog} onClose={onClose}>
             Administration
-          </Button>
+          </Way>
         )}
         {mayLook && (
-          <Button
-            component={Link}
-            to="/audit"
-            variant="default"
-            leftSection={<IconFileSearch size={15} aria-hidden />}
-            onClick={onClose}
-          >
+          <Way to="/audit" Sign={IconFileSearch} onClose={onClose}>
             Audit
-          </Button>
+          </Way>
         )}
         {!window.isSecureContext && (
           <Text size="sm" c="dimmed">

@@ -16,14 +16,13 @@ import {
   useSharing,
 } from "../api/sharing";
 import type { ViewedThing } from "../api/view-links";
-import { ConfirmRow } from "../ui/confirm-row";
 import { useIsPhone } from "../ui/hooks";
 import { Segments } from "../ui/segments";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./share-dialog.module.css";
-import { CopyButton, ViewLinks } from "./view-links";
+import { LinkToCopy, ViewLinks } from "./view-links";
 
 const INVITED = ["viewer", "editor", "operator"] as const satisfies readonly Role[];
 const LABELS: Record<(typeof INVITED)[number], string> = {
@@ -284,7 +283,6 @@ interface ShareLinkProps {
 export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
   const now = useNow(20_000);
   const [code, setCode] = useState(false);
-  const [asking, setAsking] = useState(false);
   const link = origin + invitation.path;
   const label = invitation.label || `${invitation.role}s`;
   const made = instant(invitation.made_at);
@@ -298,15 +296,13 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
           {made !== null && ` · made ${ago(made, now)}`}
         </span>
       </div>
-      <div className={style.row}>
-        <TextInput
-          readOnly
-          className={style.text ?? ""}
-          aria-label={`Link for ${isolated(label)}`}
-          value={link}
-          onFocus={(event) => event.currentTarget.select()}
-        />
-        <CopyButton text={link} what={`the link for ${isolated(label)}`} />
+      <LinkToCopy
+        named={label}
+        link={link}
+        revoked="Everybody who signed in with this link is signed out at once, on all devices."
+        isRevoking={revoke.isPending && revoke.variables === invitation.id}
+        onRevoke={() => revoke.mutate(invitation.id)}
+      >
         <Button
           leftSection={<IconQrcode size={15} />}
           aria-expanded={code}
@@ -315,26 +311,7 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
         >
           Code
         </Button>
-        <Button
-          color="red"
-          variant="subtle"
-          className="ink-error"
-          aria-label={`Revoke the link for ${isolated(label)}`}
-          onClick={() => setAsking(true)}
-        >
-          Revoke
-        </Button>
-      </div>
-      {asking && (
-        <ConfirmRow
-          action="Revoke now"
-          loading={revoke.isPending && revoke.variables === invitation.id}
-          onCancel={() => setAsking(false)}
-          onConfirm={() => revoke.mutate(invitation.id)}
-        >
-          Everybody who signed in with this link is signed out at once, on all devices.
-        </ConfirmRow>
-      )}
+      </LinkToCopy>
       {code && <Code src={codeUrl(invitation.id, origin)} label={label} />}
     </li>
   );

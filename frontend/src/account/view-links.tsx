@@ -1,7 +1,7 @@
 /** Links to one graph or run, without a name: made, copied, embedded and revoked. For owners. */
 import { Button, Group, Select, Text, TextInput } from "@mantine/core";
 import { IconCheck, IconCode, IconCopy } from "@tabler/icons-react";
-import { useState } from "react";
+import { type ReactNode, useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import {
@@ -37,7 +37,7 @@ export function frameText(link: string, title: string): string {
   );
 }
 
-export function CopyButton({
+function CopyButton({
   text,
   what,
   word = "Copy",
@@ -55,6 +55,59 @@ export function CopyButton({
     >
       {words}
     </Button>
+  );
+}
+
+interface LinkToCopyProps {
+  /** The person, thing or purpose that the link is for, as labels call it. */
+  named: string;
+  link: string;
+  /** The sentence that says what a revocation does. */
+  revoked: string;
+  isRevoking: boolean;
+  onRevoke: () => void;
+  /** More buttons of the link. */
+  children: ReactNode;
+}
+
+/** Shows a link with the buttons that copy it and, after a question, revoke it. */
+export function LinkToCopy(props: LinkToCopyProps) {
+  const { link, revoked, isRevoking, onRevoke, children } = props;
+  const [asking, setAsking] = useState(false);
+  const named = isolated(props.named);
+  return (
+    <>
+      <div className={style.row}>
+        <TextInput
+          readOnly
+          className={style.text ?? ""}
+          aria-label={`Link for ${named}`}
+          value={link}
+          onFocus={(event) => event.currentTarget.select()}
+        />
+        <CopyButton text={link} what={`the link for ${named}`} />
+        {children}
+        <Button
+          color="red"
+          variant="subtle"
+          className="ink-error"
+          aria-label={`Revoke the link for ${named}`}
+          onClick={() => setAsking(true)}
+        >
+          Revoke
+        </Button>
+      </div>
+      {asking && (
+        <ConfirmRow
+          action="Revoke now"
+          loading={isRevoking}
+          onCancel={() => setAsking(false)}
+          onConfirm={onRevoke}
+        >
+          {revoked}
+        </ConfirmRow>
+      )}
+    </>
   );
 }
 
@@ -147,7 +200,6 @@ interface LinkProps {
 
 function OneLink({ link, origin, frames, revoke }: LinkProps) {
   const now = useNow(20_000);
-  const [asking, setAsking] = useState(false);
   const text = origin + link.path;
   const named = link.label || `this ${link.kind}`;
   const opened = instant(link.opened_at);
@@ -163,15 +215,13 @@ function OneLink({ link, origin, frames, revoke }: LinkProps) {
           {end !== null && ` · ends ${dateText(end)}`} · by {isolated(link.made_by.name)}
         </span>
       </div>
-      <div className={style.row}>
-        <TextInput
-          readOnly
-          className={style.text ?? ""}
-          aria-label={`Link for ${isolated(named)}`}
-          value={text}
-          onFocus={(event) => event.currentTarget.select()}
-        />
-        <CopyButton text={text} what={`the link for ${isolated(named)}`} />
+      <LinkToCopy
+        named={named}
+        link={text}
+        revoked="Whoever has it open sees nothing more, at once."
+        isRevoking={revoke.isPending && revoke.variables === link.id}
+        onRevoke={() => revoke.mutate(link.id)}
+      >
         {frames.length > 0 && (
           <CopyButton
             text={frameText(text, link.label || `A ${link.kind}`)}
@@ -179,26 +229,7 @@ function OneLink({ link, origin, frames, revoke }: LinkProps) {
             word="Embed"
           />
         )}
-        <Button
-          color="red"
-          variant="subtle"
-          className="ink-error"
-          aria-label={`Revoke the link for ${isolated(named)}`}
-          onClick={() => setAsking(true)}
-        >
-          Revoke
-        </Button>
-      </div>
-      {asking && (
-        <ConfirmRow
-          action="Revoke now"
-          loading={revoke.isPending && revoke.variables === link.id}
-          onCancel={() => setAsking(false)}
-          onConfirm={() => revoke.mutate(link.id)}
-        >
-          Whoever has it open sees nothing more, at once.
-        </ConfirmRow>
-      )}
+      </LinkToCopy>
     </li>
   );
 }

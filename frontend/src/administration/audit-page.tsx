@@ -94,7 +94,7 @@ function Inside() {
             No event of the logs matches these filters.
           </Empty>
         ) : (
-          <ol className={style.rows}>
+          <ol className="m-0 p-0 text-13 list-none">
             {rows.map((row) => (
               <Row key={row.id} row={row} who={nameOf(row)} now={now} />
             ))}

@@ -177,7 +177,7 @@ function TokenRows({ tokens }: { tokens: TokenShown[] }) {
           </Button>
         </p>
       )}
-      <ul className={style.tokens} aria-label={counted(tokens.length, "token")}>
+      <ul className="list-reset" aria-label={counted(tokens.length, "token")}>
         {tokens.map((token) => (
           <TokenRow key={token.record.id} token={token} revoke={revoke} />
         ))}

@@ -1,5 +1,6 @@
 /** Keeps a run as an incident: it is never archived, and one file of all that is known is downloaded. */
 import { Button, Modal, Stack, Text, TextInput } from "@mantine/core";
+import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { editor } from "../api/client";
 import { errorText, fetchAnswer } from "../api/http";
@@ -16,20 +17,11 @@ interface Props {
 
 export function IncidentDialog({ runner, run, onClose }: Props) {
   const [reason, setReason] = useState("");
-  const [refused, setRefused] = useState("");
-  const [busy, setBusy] = useState(false);
-  const keep = async () => {
-    setBusy(true);
-    setRefused("");
-    try {
-      saveFile(await keepIncident(runner, run, reason), `incident-${run.number}.zip`);
-      onClose();
-    } catch (error) {
-      setRefused(errorText(error));
-    } finally {
-      setBusy(false);
-    }
-  };
+  const keep = useMutation({
+    mutationFn: async () =>
+      saveFile(await keepIncident(runner, run, reason), `incident-${run.number}.zip`),
+    onSuccess: onClose,
+  });
   return (
     <Modal opened onClose={onClose} title={`Keep run ${run.number} as an incident`} centered>
       <Stack gap="sm">
@@ -45,12 +37,12 @@ export function IncidentDialog({ runner, run, onClose }: Props) {
           onChange={(event) => setReason(event.currentTarget.value)}
           data-autofocus
         />
-        {refused !== "" && (
+        {keep.isError && (
           <Text size="sm" c="red" role="alert">
-            {refused}
+            {errorText(keep.error)}
           </Text>
         )}
-        <Button loading={busy} onClick={() => void keep()}>
+        <Button loading={keep.isPending} onClick={() => keep.mutate()}>
           Keep and download
         </Button>
       </Stack>

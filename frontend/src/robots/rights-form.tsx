@@ -13,7 +13,7 @@ import {
   TextInput,
 } from "@mantine/core";
 import { IconX } from "@tabler/icons-react";
-import { useQueryClient } from "@tanstack/react-query";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
@@ -60,10 +60,10 @@ function Operators(props: {
     onChange(chosen.map((each) => (each.id === changed.id ? changed : each)));
   return (
     <>
-      <ul className={style.list} aria-label="Who may start there">
+      <ul className="list-reset" aria-label="Who may start there">
         {chosen.map((each) => (
           <li key={each.id} className={style.line}>
-            <span className={style.name}>{isolated(each.name || NAMELESS)}</span>
+            <span className="ellipsis weight-550 flex-1">{isolated(each.name || NAMELESS)}</span>
             <TextInput
               size="xs"
               type="date"
@@ -118,12 +118,8 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
     null,
   );
-  const [error, setError] = useState<unknown>(null);
-  const [busy, setBusy] = useState(false);
-  const save = async () => {
-    setError(null);
-    setBusy(true);
-    try {
+  const save = useMutation({
+    mutationFn: async () => {
       const operators = all ? ("all" as const) : [...chosen];
       await setRights(runner ?? "", robot.name, {
         operators,
@@ -138,12 +134,9 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
         health: checksOf(health),
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
-      onClose();
-    } catch (problem) {
-      setError(problem);
-      setBusy(false);
-    }
-  };
+    },
+    onSuccess: onClose,
+  });
   return (
     <Modal
       opened
@@ -154,7 +147,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
       <form
         onSubmit={(event) => {
           event.preventDefault();
-          void save();
+          save.mutate();
         }}
       >
         <Stack gap="md">
@@ -222,14 +215,14 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
           <StopTopicFields stop={stop} onChange={setStop} />
           <HealthFields drafts={health} onChange={setHealth} />
           <LimitFields drafts={limits} onChange={setLimits} />
-          {error !== null && (
+          {save.isError && (
             <Text c="var(--error)" role="alert">
-              {errorText(error)}
+              {errorText(save.error)}
             </Text>
           )}
           <Group justify="flex-end">
             <Button onClick={onClose}>Cancel</Button>
-            <Button type="submit" variant="filled" loading={busy}>
+            <Button type="submit" variant="filled" loading={save.isPending}>
               Save
             </Button>
           </Group>
@@ -244,19 +237,10 @@ export function LockForm({ robot, onClose }: { robot: Robot; onClose: () => void
   const { runner } = useLive();
   const [reason, setReason] = useState("");
   usePendingText(reason, null);
-  const [error, setError] = useState<unknown>(null);
-  const [busy, setBusy] = useState(false);
-  const lock = async () => {
-    setError(null);
-    setBusy(true);
-    try {
-      await lockRobot(runner ?? "", robot.name, reason.trim());
-      onClose();
-    } catch (problem) {
-      setError(problem);
-      setBusy(false);
-    }
-  };
+  const lock = useMutation({
+    mutationFn: () => lockRobot(runner ?? "", robot.name, reason.trim()),
+    onSuccess: onClose,
+  });
   return (
     <Modal
       opened
@@ -267,7 +251,7 @@ export function LockForm({ robot, onClose }: { robot: Robot; onClose: () => void
       <form
         onSubmit={(event) => {
           event.preventDefault();
-          void lock();
+          lock.mutate();
         }}
       >
         <Stack gap="md">
@@ -283,9 +267,9 @@ export function LockForm({ robot, onClose }: { robot: Robot; onClose: () => void
             data-autofocus
             onChange={(event) => setReason(event.currentTarget.value)}
           />
-          {error !== null && (
+          {lock.isError && (
             <Text c="var(--error)" role="alert">
-              {errorText(error)}
+              {errorText(lock.error)}
             </Text>
           )}
           <Group justify="flex-end">
@@ -294,7 +278,7 @@ export function LockForm({ robot, onClose }: { robot: Robot; onClose: () => void
               type="submit"
               variant="filled"
               color="red"
-              loading={busy}
+              loading={lock.isPending}
               disabled={reason.trim().length < 3}
             >
               Put out of service

@@ -220,7 +220,7 @@ function isOnGraph(graph: Graph, place: string | null): boolean {
 function ActionFacts({ action, onClose }: { action: Action; onClose: () => void }) {
   return (
     <div className="stack gap-50">
-      <div className={style.of}>
+      <div className="row justify-between gap-50">
         <h2 className="m-0 text-13 weight-650 break-anywhere">{fullName(action)}</h2>
         <CloseButton aria-label="All actions" onClick={onClose} />
       </div>

@@ -1,7 +1,7 @@
 /** The mark by which a start asks for an input, and the bounds of what can be given there. */
 import { Group, Switch } from "@mantine/core";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { setAsk } from "../../graph/edit/parameters";
+import { setAsk } from "../../graph/edit/asks";
 import type { Action, Parameter } from "../../graph/model";
 import { askedPaths, askOf, type Bounds } from "../../graph/parameters/asked-inputs";
 import { readValue } from "../../graph/parameters/data-flow";
