@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from sqlalchemy import make_url
 from sqlalchemy.exc import DBAPIError
 
-from action_assistant import paths, settings
+from action_assistant import settings
+from action_assistant.commands.place import add_data, add_database
 from action_assistant.errors import CannotStart, Refused, Unavailable
 from action_assistant.journal import foreign_schema, heads
 from action_assistant.journal.chain import Damage
@@ -34,7 +35,8 @@ def _add_verify(verify: argparse.ArgumentParser) -> None:
         "action-assistant verify --head --sign ~/heads.pem >> heads.txt; "
         "action-assistant verify --against heads.txt --key ~/heads.pem"
     )
-    add_place(verify)
+    add_data(verify)
+    add_database(verify)
     verify.add_argument(
         "--head",
         action="store_true",
@@ -63,23 +65,12 @@ def _add_verify(verify: argparse.ArgumentParser) -> None:
 
 def _add_rebuild(rebuild: argparse.ArgumentParser) -> None:
     rebuild.epilog = "example: action-assistant rebuild --data ./data"
-    add_place(rebuild)
+    add_data(rebuild)
+    add_database(rebuild)
     rebuild.set_defaults(handler=_rebuild)
 
 
 COMMANDS: Final = {"verify": _add_verify, "rebuild": _add_rebuild}
-
-
-def add_place(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
-    parser.add_argument(
-        "--database",
-        metavar="URL",
-        default=settings.database(),
-        help="of the editor; default: the one that was served last",
-    )
 
 
 def verify_with_head(data: Path, database: str | None, sign: Path | None) -> int:

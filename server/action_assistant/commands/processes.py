@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from action_assistant import paths, settings
+from action_assistant import settings
 from action_assistant.commands.backups.options import add_rules, span
+from action_assistant.commands.place import add_data, add_database
 from action_assistant.errors import CannotStart
 from action_assistant.logs import FORMS, LEVELS, hand_on, log_settings, set_up
 from action_assistant.settings import Site
@@ -89,9 +90,7 @@ def _backups(parser: argparse.ArgumentParser) -> None:
 
 
 def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
-    parser.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
+    add_data(parser)
     parser.add_argument(
         "--host",
         metavar="H",
@@ -103,11 +102,9 @@ def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
 
 
 def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
-    parser.add_argument(
-        "--database",
-        metavar="URL",
-        default=settings.database(),
-        help="of the editor; default: the one that was served last, at first sqlite in the data folder",
+    add_database(
+        parser,
+        "of the editor; default: the one that was served last, at first sqlite in the data folder",
     )
     if switch:
         parser.add_argument(

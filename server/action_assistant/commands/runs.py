@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import msgspec
 
-from action_assistant import paths, settings
+from action_assistant import settings
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.commands.client import (
     Server,
@@ -22,6 +22,7 @@ from action_assistant.commands.client import (
     running,
 )
 from action_assistant.commands.drafts import changes_lines
+from action_assistant.commands.place import add_data
 from action_assistant.commands.presses import press
 from action_assistant.commands.questions import add_questions
 from action_assistant.commands.repeats import add_repeats
@@ -398,9 +399,7 @@ def _add_archives(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -
         epilog="example: action-assistant runs restore run-000042-AbC.jsonl.gz --data ./data",
     )
     restore.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    restore.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
+    add_data(restore)
     restore.set_defaults(handler=_restore)
 
 
@@ -480,9 +479,7 @@ def _add_copy(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
         epilog="example: action-assistant runs copy --to postgresql://lab@db/lab --follow",
     )
     copy.add_argument("--to", required=True, metavar="URL", help="postgresql://USER@HOST/NAME")
-    copy.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
+    add_data(copy)
     copy.add_argument(
         "--follow", action="store_true", help="go on, until Ctrl-C, also while the database is away"
     )

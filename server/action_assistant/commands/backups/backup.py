@@ -18,7 +18,7 @@ from typing import Final
 
 import msgspec
 
-from action_assistant import paths, settings
+from action_assistant import settings
 from action_assistant.commands.backups import restore
 from action_assistant.commands.backups.backup_file import ARCHIVE, FILES, Package
 from action_assistant.commands.backups.data_folder import left_out, sweep
@@ -32,6 +32,7 @@ from action_assistant.commands.backups.options import (
     superfluous,
 )
 from action_assistant.commands.backups.progress import Progress
+from action_assistant.commands.place import add_data, add_database
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
@@ -55,8 +56,8 @@ def _add_backup(backup: argparse.ArgumentParser) -> None:
         "it, or if it could not be taken elsewhere"
     )
     backup.add_argument("file", type=Path, nargs="?", metavar="FILE", help="the backup to write")
-    _add_data(backup)
-    _add_database(backup, "of the editor; default: the one that was served last")
+    add_data(backup)
+    add_database(backup, "of the editor; default: the one that was served last")
     backup.add_argument(
         "--into",
         type=Path,
@@ -79,8 +80,8 @@ def _add_restore(back: argparse.ArgumentParser) -> None:
         "action-assistant restore --rehearse monday.zip"
     )
     back.add_argument("file", type=Path, metavar="FILE")
-    _add_data(back)
-    _add_database(
+    add_data(back)
+    add_database(
         back,
         "where the graphs shall be, an empty database; default: where those of the folder are",
     )
@@ -94,16 +95,6 @@ def _add_restore(back: argparse.ArgumentParser) -> None:
 
 
 COMMANDS: Final = {"backup": _add_backup, "restore": _add_restore}
-
-
-def _add_data(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
-
-
-def _add_database(command: argparse.ArgumentParser, text: str) -> None:
-    command.add_argument("--database", metavar="URL", default=settings.database(), help=text)
 
 
 def _backup(options: argparse.Namespace) -> int:

@@ -14,9 +14,10 @@ from typing import Final
 
 from sqlalchemy import Connection, MetaData, NullPool, create_engine, insert, make_url, select
 
-from action_assistant import paths, settings
+from action_assistant import settings
 from action_assistant.commands.backups.data_folder import aside_folder
 from action_assistant.commands.backups.progress import Progress
+from action_assistant.commands.place import add_data, add_database
 from action_assistant.editor.log import database_location
 from action_assistant.errors import CannotStart, NewerSchema
 from action_assistant.journal.copies.before_upgrade import (
@@ -260,15 +261,8 @@ def _told(folder: Path) -> Iterator[None]:
 
 def _add_migrate(migrate: argparse.ArgumentParser) -> None:
     migrate.epilog = "example: action-assistant migrate --data ./data"
-    migrate.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
-    migrate.add_argument(
-        "--database",
-        metavar="URL",
-        default=settings.database(),
-        help="of the editor; default: the one that was served last",
-    )
+    add_data(migrate)
+    add_database(migrate)
     ways = migrate.add_mutually_exclusive_group()
     ways.add_argument(
         "--back",

@@ -23,7 +23,7 @@ from typing import Any, Final, NamedTuple
 from sqlalchemy import Connection, Table, make_url, select, text
 from sqlalchemy.exc import ArgumentError
 
-from action_assistant import paths, settings
+from action_assistant import settings
 from action_assistant.commands.backups.data_folder import (
     MOVED,
     aside_folder,
@@ -32,6 +32,7 @@ from action_assistant.commands.backups.data_folder import (
     workshop,
 )
 from action_assistant.commands.backups.progress import Progress
+from action_assistant.commands.place import add_data, add_database
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies.before_upgrade import FOLDER, keep_copy
 from action_assistant.journal.copies.copying import copy
@@ -116,14 +117,10 @@ def _add_move(move: argparse.ArgumentParser) -> None:
         metavar="URL|sqlite",
         help="an empty Postgres database, or the data folder itself",
     )
-    move.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
-    )
-    move.add_argument(
-        "--database",
-        metavar="URL",
-        default=settings.database(),
-        help="where the graphs are now, if its password is asked for; default: as the folder knows it",
+    add_data(move)
+    add_database(
+        move,
+        "where the graphs are now, if its password is asked for; default: as the folder knows it",
     )
     move.set_defaults(handler=_move)
 

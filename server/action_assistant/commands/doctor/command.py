@@ -3,14 +3,13 @@ looks only at robots."""
 
 import argparse
 from contextlib import suppress
-from pathlib import Path
 from typing import Final
 
 import msgspec
 
-from action_assistant import paths as places
 from action_assistant import settings
 from action_assistant.commands.doctor.installation import Installation
+from action_assistant.commands.place import add_data
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.system.diagnostics import Diagnostic, Severity
@@ -22,9 +21,7 @@ def _add_doctor(doctor: argparse.ArgumentParser) -> None:
     doctor.epilog = (
         "example: action-assistant doctor --data ./data; exit code 1 if something is wrong"
     )
-    doctor.add_argument(
-        "--data", type=Path, default=places.data(), metavar="DIR", help="default: %(default)s"
-    )
+    add_data(doctor)
     doctor.add_argument(
         "--database",
         metavar="URL",

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -95,15 +96,17 @@ def _setting(name: str, value: str) -> Iterator[Diagnostic]:
             f"{meant}Correct or unset it; docs/network.md and `action-assistant serve --help` have all.",
         )
         return
+    if not value.strip():
+        return
     try:
-        if value.strip():
-            _READERS.get(name, _anything)(value)
+        if name in _TEXT_READERS:
+            _TEXT_READERS[name](value)
+        elif name in _READERS:
+            _READERS[name]({name: value})
     except CannotStart as error:
         yield found("setting-wrong", name, str(error), f"Correct or unset {name}.")
-
-
-def _anything(_: str) -> None:
-    """Accept any value of a setting, since another check reads it."""
+    except argparse.ArgumentTypeError as error:
+        yield found("setting-wrong", name, f"{error}.", f"Correct or unset {name}.")
 
 
 def _hosts(value: str) -> None:
@@ -121,74 +124,39 @@ def _url(value: str) -> None:
         )
 
 
-def _days(name: str) -> Callable[[str], object]:
-    return lambda value: settings.keep(Path(), {name: value})
-
-
-def _file(name: str) -> Callable[[str], object]:
-    return lambda value: settings.take_secrets_from_files({name: value})
-
-
-def _log(name: str) -> Callable[[str], object]:
-    return lambda value: log_settings(environ={name: value})
-
-
-def _metrics(name: str) -> Callable[[str], object]:
-    return lambda value: settings.metrics_token({name: value})
-
-
-def _argument(reads: Callable[[str], object]) -> Callable[[str], object]:
-    """Return `reads` with the errors of argparse turned into CannotStart."""
-
-    def read(value: str) -> object:
-        try:
-            return reads(value)
-        except argparse.ArgumentTypeError as error:
-            raise CannotStart(f"{error}.") from error
-
-    return read
-
-
-_READERS: Final[Mapping[str, Callable[[str], object]]] = {
-    "ACTION_ASSISTANT_PORT": lambda value: settings.port({"ACTION_ASSISTANT_PORT": value}),
-    **{name: _file(name) for name in settings.VARIABLES if name.endswith("_FILE")},
+#: Read a setting out of its text.
+_TEXT_READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "ACTION_ASSISTANT_TOKEN": lambda value: Keys(value, "ACTION_ASSISTANT_TOKEN"),
     "ACTION_ASSISTANT_DATABASE": database_of,
     "ACTION_ASSISTANT_URL": _url,
     "ACTION_ASSISTANT_HOSTS": _hosts,
     "ACTION_ASSISTANT_PUBLIC_URL": lambda value: settings.reached(value, ""),
     "ACTION_ASSISTANT_TRUSTED_PROXIES": lambda value: settings.reached("", value),
-    "ACTION_ASSISTANT_RUNNER_PYTHON": lambda value: interpreter.for_runner(
-        {interpreter.VARIABLE: value}
-    ),
-    "ACTION_ASSISTANT_KEEP_RUNS": _days("ACTION_ASSISTANT_KEEP_RUNS"),
-    "ACTION_ASSISTANT_KEEP_RAW": _days("ACTION_ASSISTANT_KEEP_RAW"),
-    "ACTION_ASSISTANT_AUDIT_DAYS": lambda value: settings.audit_days(
-        {"ACTION_ASSISTANT_AUDIT_DAYS": value}
-    ),
-    "ACTION_ASSISTANT_TOKEN_DAYS": lambda value: settings.token_days(
-        {"ACTION_ASSISTANT_TOKEN_DAYS": value}
-    ),
-    "ACTION_ASSISTANT_FRAME_ORIGINS": lambda value: settings.frame_origins(
-        {"ACTION_ASSISTANT_FRAME_ORIGINS": value}
-    ),
     "ACTION_ASSISTANT_NOTIFICATIONS": lambda value: receivers_of(Path(value)),
-    "ACTION_ASSISTANT_LIMITS": lambda value: settings.load_limits(
-        {"ACTION_ASSISTANT_LIMITS": value}
-    ),
-    "ACTION_ASSISTANT_WATCHDOG": lambda value: settings.watchdog(
-        {"ACTION_ASSISTANT_WATCHDOG": value}
-    ),
-    **{name: _log(name) for name in ("ACTION_ASSISTANT_LOG_FORMAT", "ACTION_ASSISTANT_LOG_LEVEL")},
+    "ACTION_ASSISTANT_BACKUP_EVERY": options.span,
+    "ACTION_ASSISTANT_BACKUP_KEEP": options.rule,
+}
+#: Read a setting out of an environment.
+_READERS: Final[Mapping[str, Callable[[dict[str, str]], object]]] = {
     **{
-        name: _metrics(name)
-        for name in ("ACTION_ASSISTANT_METRICS_TOKEN", "ACTION_ASSISTANT_METRICS_TOKEN_FILE")
+        name: settings.take_secrets_from_files
+        for name in settings.VARIABLES
+        if name.endswith("_FILE")
     },
-    settings.INDEX_FOLDERS: lambda value: settings.index_folders(
-        (), {settings.INDEX_FOLDERS: value}
-    ),
-    "ACTION_ASSISTANT_BACKUP_EVERY": _argument(options.span),
-    "ACTION_ASSISTANT_BACKUP_KEEP": _argument(options.rule),
+    "ACTION_ASSISTANT_PORT": settings.port,
+    interpreter.VARIABLE: interpreter.for_runner,
+    "ACTION_ASSISTANT_KEEP_RUNS": partial(settings.keep, Path()),
+    "ACTION_ASSISTANT_KEEP_RAW": partial(settings.keep, Path()),
+    "ACTION_ASSISTANT_AUDIT_DAYS": settings.audit_days,
+    "ACTION_ASSISTANT_TOKEN_DAYS": settings.token_days,
+    "ACTION_ASSISTANT_FRAME_ORIGINS": settings.frame_origins,
+    "ACTION_ASSISTANT_LIMITS": settings.load_limits,
+    "ACTION_ASSISTANT_WATCHDOG": settings.watchdog,
+    "ACTION_ASSISTANT_LOG_FORMAT": lambda environ: log_settings(environ=environ),
+    "ACTION_ASSISTANT_LOG_LEVEL": lambda environ: log_settings(environ=environ),
+    "ACTION_ASSISTANT_METRICS_TOKEN": settings.metrics_token,
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": settings.metrics_token,
+    settings.INDEX_FOLDERS: partial(settings.index_folders, ()),
 }
 
 
