@@ -1,6 +1,5 @@
 """`verify` and `rebuild`, on a data folder as it lies."""
 
-import asyncio
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -8,30 +7,13 @@ from pathlib import Path
 import pytest
 
 from action_assistant.cli import main, parser
-from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
-from action_assistant.journal.journal import Journal
 
 
 def run(*arguments: str) -> int:
     options = parser().parse_args(arguments)
     code: int = options.handler(options)
     return code
-
-
-@pytest.fixture
-def data(tmp_path: Path) -> Path:
-    """A folder with an editor's journal of three events."""
-
-    async def fill() -> None:
-        url = f"sqlite:///{tmp_path / 'editor.db'}"
-        journal = await Journal.open(url, branch="editor", fold=h.fold)
-        for name in ("Ada", "Ada L.", "Ada Lovelace"):
-            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.PersonNamed(name))])
-        await journal.close()
-
-    asyncio.run(fill())
-    return tmp_path
 
 
 def change(data: Path, sql: str) -> None:

@@ -1,6 +1,5 @@
 """`backup` while the server runs, and `restore`, after which history is another one."""
 
-import asyncio
 import json
 import shutil
 import sqlite3
@@ -13,9 +12,7 @@ import pytest
 
 from action_assistant.cli import parser
 from action_assistant.editor.app import open_services
-from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
-from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from editor.process import Editor
 from support.command_line import ran
@@ -78,21 +75,6 @@ def here(*arguments: str | Path) -> int:
     options = parser().parse_args(list(map(str, arguments)))
     code: int = options.handler(options)
     return code
-
-
-@pytest.fixture
-def data(tmp_path: Path) -> Path:
-    """A folder with an editor's journal of three events."""
-
-    async def fill() -> None:
-        url = f"sqlite:///{tmp_path / 'editor.db'}"
-        journal = await Journal.open(url, branch="editor", fold=h.fold)
-        for name in ("Ada", "Ada L.", "Ada Lovelace"):
-            await journal.append(h.PEOPLE, [h.draft(h.NAMED, "ada", h.PersonNamed(name))])
-        await journal.close()
-
-    asyncio.run(fill())
-    return tmp_path
 
 
 def cut(file: Path) -> None:
