@@ -6,7 +6,6 @@ other process nor a database. A token ends with its file, with the mark `token-I
 maker, and with the link by which its maker came.
 """
 
-import asyncio
 import contextlib
 import hmac
 import logging
@@ -15,7 +14,7 @@ import secrets
 import time
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import msgspec
 
@@ -28,21 +27,13 @@ from action_assistant.errors import (
     Unavailable,
     Withdrawn,
 )
-from action_assistant.private_files import (
-    DamagedFile,
-    FileState,
-    read_json,
-    read_logged,
-    replace_file,
-    state_of,
-    sync,
-    write_json,
-)
+from action_assistant.private_files import sync, write_json
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.settings import TOKEN_DAYS
 from action_assistant.web.auth.identity import Identity, Scope, Token
 from action_assistant.web.auth.keys import SKEW_S, Keys, Person, PersonRef
+from action_assistant.web.auth.record_files import RecordFiles
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission, Role, allowed, rank
 from action_assistant.web.auth.token_text import PREFIX, digest_of, new_text, proof, token_id
@@ -55,7 +46,6 @@ NAME_LIMIT: Final = 60  # characters
 _MOST: Final = 1000  # tokens
 _MOST_OF_ONE: Final = 100  # tokens of one person
 _DAY_S: Final = 24 * 3600
-_USE_S: Final = 60.0  # between two writes of the last use
 _ID: Final = re.compile(r"[A-Za-z0-9]{12}")
 
 #: The scopes that a scope includes.
@@ -121,13 +111,6 @@ class MadeToken(msgspec.Struct, frozen=True):
     record: TokenRecord
 
 
-class _Read(NamedTuple):
-    """A record in memory, and the state of its file as it was read."""
-
-    state: FileState
-    record: TokenRecord | None
-
-
 def completed(scopes: Iterable[Scope]) -> frozenset[Scope]:
     """Return scopes together with those that they include."""
     given = frozenset(scopes)
@@ -142,12 +125,9 @@ class TokenFiles:
         self, data: Path, keys: Keys, revoked: Revocations, *, most_days: float = TOKEN_DAYS
     ) -> None:
         self.most_days: Final = most_days
-        self._folder = data / FOLDER
         self._keys = keys
         self._revoked = revoked
-        self._known: dict[str, _Read] = {}
-        self._uses: dict[str, TokenUse] = {}
-        self._written: dict[str, float] = {}  # the last write of a use, on the monotonic clock
+        self._files = RecordFiles(data / FOLDER, TokenRecord, TokenUse, self._accepts, most=_MOST)
         self._nothing = secrets.token_hex(32)  # the hash of a token that does not exist
 
     def opens(self, text: str) -> Token | None:
@@ -158,7 +138,7 @@ class TokenFiles:
         name = token_id(text)
         if name is None:
             raise Unauthenticated("This token was cut short or mistyped.")
-        record = self._record(name)
+        record = self._files.get(name)
         expected = self._nothing if record is None else record.sha256
         is_right = hmac.compare_digest(digest_of(text).encode(), expected.encode())
         if record is None or not is_right:
@@ -231,25 +211,22 @@ class TokenFiles:
             raise BadInput("This server did not make the token.")
         if self._revoked.token_ended(record.id):
             raise Conflict(f"The token {record.id} was revoked.")
-        if self._record(record.id) is None:
+        if self._files.get(record.id) is None:
             self._write(record)
 
     def every(self, person: str | None = None) -> list[TokenShown]:
         """Return the tokens that were not revoked, the newest first; with `person`, only those of
         that person."""
-        found = []
-        with contextlib.suppress(OSError):
-            for path in list(self._folder.glob("*.json")):
-                record = self._record(path.stem)
-                if record is None or self._has_ended(record):
-                    continue
-                if person in {None, record.person.id}:
-                    found.append(TokenShown(record, self._used(record.id)))
+        found = [
+            TokenShown(record, self._used(record.id))
+            for record in self._files.every()
+            if person in {None, record.person.id} and not self._has_ended(record)
+        ]
         return sorted(found, key=lambda each: each.record.made_at, reverse=True)
 
     def get(self, token: str) -> TokenRecord:
         """Return one token. Raise NotFound if there is none with this id, or if it was revoked."""
-        record = self._record(token) if _ID.fullmatch(token) else None
+        record = self._files.get(token) if _ID.fullmatch(token) else None
         if record is None or self._has_ended(record):
             raise NotFound(f"There is no token {token!r}.")
         return record
@@ -264,29 +241,24 @@ class TokenFiles:
         except Unavailable as error:
             unwritten = error
         try:
-            self._path(token).unlink(missing_ok=True)
-            sync(self._folder)
+            self._files.path(token).unlink(missing_ok=True)
+            sync(self._files.folder)
         except OSError:
             if unwritten is not None:
                 raise unwritten from None
-        self._uses.pop(token, None)
+        self._files.uses.pop(token, None)
         with contextlib.suppress(OSError):
-            self._path(token, ".used").unlink(missing_ok=True)
+            self._files.path(token, ".used").unlink(missing_ok=True)
         log.info("token %s is revoked", token)
 
     def note_use(self, token: str, address: str) -> None:
-        """Remember the use of a token, and write it at most once a minute, on a thread. Call it in
-        the event loop."""
-        self._uses[token] = TokenUse(time.time(), address)
-        now = time.monotonic()
-        if now - self._written.get(token, -_USE_S) >= _USE_S:
-            self._written[token] = now
-            asyncio.get_running_loop().run_in_executor(None, self._write_use, token)
+        """Remember the use of a token. Call it in the event loop."""
+        self._files.note_use(token, TokenUse(time.time(), address))
 
     def prove(self, token: str, challenge: str, address: str) -> str:
         """Return the proof that this process knows a token, before a program shows it. For an
         unknown token the proof is that of no token, so that strangers do not learn which exist."""
-        record = self._record(token) if _ID.fullmatch(token) else None
+        record = self._files.get(token) if _ID.fullmatch(token) else None
         return proof(self._nothing if record is None else record.sha256, challenge, address)
 
     def check(self, name: str, days: float | None) -> str:
@@ -315,34 +287,6 @@ class TokenFiles:
             if not allowed(role, permission):
                 raise Forbidden(f"You are here as {role}: you cannot give the scope {scope}.")
 
-    def _record(self, token: str) -> TokenRecord | None:
-        """Return the record of a token, read anew if its file has changed; None without a file that
-        this server sealed. If the whole folder is gone, what was read before counts."""
-        known = self._known.get(token)
-        try:
-            state = state_of(self._path(token))
-            if known is None or known.state != state:
-                known = _Read(state, self._read(token))
-                self._remember(token, known)
-        except FileNotFoundError:
-            if known is not None and not self._folder.is_dir():
-                return known.record
-            self._known.pop(token, None)
-            return None
-        except OSError:  # the disk is gone, for which no program is put out
-            pass
-        return None if known is None else known.record
-
-    def _remember(self, token: str, read: _Read) -> None:
-        if len(self._known) > 2 * _MOST:
-            self._known.clear()
-        self._known[token] = read
-
-    def _read(self, token: str) -> TokenRecord | None:
-        record = read_logged(self._path(token), TokenRecord)
-        is_ours = record is not None and record.id == token and self._is_sealed(record)
-        return record if is_ours else None
-
     def _has_ended(self, record: TokenRecord) -> bool:
         return (
             self._revoked.token_ended(record.id)
@@ -352,35 +296,23 @@ class TokenFiles:
 
     def _write(self, record: TokenRecord) -> None:
         try:
-            self._folder.mkdir(mode=0o700, exist_ok=True)
-            write_json(self._path(record.id), record)
-            sync(self._folder)
+            self._files.folder.mkdir(mode=0o700, exist_ok=True)
+            write_json(self._files.path(record.id), record)
+            sync(self._files.folder)
         except OSError as error:
             raise Unavailable(
-                f"The token cannot be stored in {self._folder}: {error.strerror}."
+                f"The token cannot be stored in {self._files.folder}: {error.strerror}."
             ) from error
 
     def _used(self, token: str) -> TokenUse | None:
         """Return the newest use of which this process or the other one has told."""
-        ours = self._uses.get(token)
-        try:
-            stored = read_json(self._path(token, ".used"), TokenUse)
-        except (OSError, DamagedFile):  # only the time of a use is lost
-            return ours
-        return stored if ours is None or ours.at < stored.at else ours
+        ours, stored = self._files.uses.get(token), self._files.stored_use(token)
+        if ours is None or stored is None:
+            return ours or stored
+        return stored if ours.at < stored.at else ours
 
-    def _write_use(self, token: str) -> None:
-        use, path = self._uses.get(token), self._path(token, ".used")
-        if use is None or not self._path(token).exists():  # it was revoked meanwhile
-            return
-        try:
-            part = path.with_suffix(f".{random_id()}.part")  # the other process may write too
-            replace_file(path, msgspec.json.encode(use), part=part, is_durable=False)
-        except OSError as error:
-            log.warning("the use of a token could not be noted: %s", error.strerror)
-
-    def _path(self, token: str, suffix: str = ".json") -> Path:
-        return self._folder / f"{token}{suffix}"
+    def _accepts(self, token: str, record: TokenRecord) -> bool:
+        return record.id == token and self._is_sealed(record)
 
     def _seal(self, record: TokenRecord) -> str:
         fields = (
