@@ -481,3 +481,21 @@ def test_the_clock_of_the_runner_gives_moments_that_people_can_send_back() -> No
         assert microseconds(time(clock_us())) == clock_us()
 
     run_in_virtual_time(main)
+
+
+@virtual
+async def test_of_many_reasons_the_first_and_the_newest_are_shown_and_the_others_counted() -> None:
+    lab = Lab()
+    async with lab.runner() as control:
+        run = await lab.led_run(control)
+        for number in range(60):
+            control._conductors._open[run].gate.hold_run(f"{number:02}: a robot was lost there.")
+        why = now_held(control, run).why
+        assert why.startswith("00: a robot was lost there. 01: ")
+        assert why.endswith(" 59: a robot was lost there.")
+        shown = why.count("a robot was lost there.")
+        assert f"{60 - shown} more stand in the events of the run." in why
+        assert 30 < shown < 60
+        assert len(why) < 1200
+        await control.stop(run, ANN)
+        await ended(control, run)

@@ -44,7 +44,7 @@ from action_assistant.web.auth.identity import Identity
 
 #: Reasons that replace another one: whoever lets the run go on has seen the most serious.
 _RANK: Final[Mapping[HeldHow, int]] = {"wait": 0, "step": 0, "breakpoint": 1, "trouble": 2}
-_LONGEST_WHY: Final = 1_000  # characters of earlier reasons, before the newest
+_LONGEST_WHY: Final = 1_000  # characters of earlier reasons, from which on not all are shown
 
 
 class LedGate(Gate):
@@ -78,6 +78,7 @@ class LedGate(Gate):
         self._clock_us = clock_us
         self._tell = tell
         self._reasons: set[str] = set()  # for which it is held now
+        self._first_why, self._between = "", 0  # as far as it is shown, and how many are not
         self._ready: dict[int, Step] = {}  # the steps that wait before the gate, by call
         self._noted: set[int] = set()  # those of which that is recorded
         self._let: Step | None = None  # the only step that may pass, since a person let it
@@ -115,14 +116,15 @@ class LedGate(Gate):
 
     def _hold(self, held: Held, author: str = "") -> None:
         known = self.held
-        self._reasons = self._reasons if known is not None else set()
+        if known is None:
+            self._reasons, self._first_why = set(), ""
         is_told = held.why in self._reasons
         # Each press of a person counts, also one with the same words: nothing goes on past it.
         if self.is_final or (is_told and held.by is None):
             return
         self._reasons.add(held.why)
         if known is not None and _RANK[known.how] >= _RANK[held.how]:
-            why = known.why if is_told else f"{known.why[:_LONGEST_WHY]} {held.why}"
+            why = known.why if is_told else self._with(known.why, held.why)
             held = replace(held, how=known.how, why=why, node=known.node)
         self.hold(held)
         self.on_hold()
@@ -130,6 +132,17 @@ class LedGate(Gate):
         self._tell(held, author)
         for step in self._ready.values():
             self._note_waiting(step)
+
+    def _with(self, earlier: str, newest: str) -> str:
+        """Return earlier reasons with the newest. When they have become long, the first ones and the
+        newest are kept, and it is told how many stand between them."""
+        if not self._first_why:
+            if len(earlier) > _LONGEST_WHY:
+                self._first_why, self._between = earlier, 0
+            return f"{earlier} {newest}"
+        self._between += 1
+        others = "1 more reason stands" if self._between == 1 else f"{self._between} more stand"
+        return f"{self._first_why} … {others} in the events of the run. {newest}"
 
     def _note_waiting(self, step: Step) -> None:
         call = step.call.number

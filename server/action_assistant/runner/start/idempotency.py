@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
 import anyio
@@ -24,10 +25,12 @@ from action_assistant.web.auth.caller import BackgroundTasks
 class StopOrder:
     """Counts Stops, so that a start that was asked for before a Stop does not leave after it, and
     other reasons for which starts that are under way may not leave. Robots and groups are known by
-    their names; "" stands for everything."""
+    their names; "" stands for everything. Of so many things at most each is remembered by itself: what was
+    noted of the others counts for everything, so a start that was asked for before does not leave."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int = 2000) -> None:
         self.count = 0
+        self._most = most
         self._newest: dict[str, tuple[int, Author, str]] = {}
         self._refused: dict[str, tuple[int, str]] = {}
 
@@ -35,18 +38,22 @@ class StopOrder:
         """Let no start of this repeat, or with this request id, leave that was asked for before now.
         `why`: the reason, as a sentence."""
         self.count += 1
+        self._refused.pop(what, None)
         self._refused[what] = self.count, why
+        _merge_oldest(self._refused, self._most)
 
     def why_refused(self, count: int, *names: str) -> str:
         """Return why a start with one of these names, which was asked for after the first `count`
         Stops, may not leave any more; "" if it may."""
-        known = (self._refused[each] for each in names if each in self._refused)
+        known = (self._refused[each] for each in (*names, "") if each in self._refused)
         return next((why for number, why in known if number > count), "")
 
     def note(self, what: str, author: Author, stop_id: str = "") -> None:
         """Count a Stop of this robot or group, or of everything."""
         self.count += 1
+        self._newest.pop(what, None)
         self._newest[what] = self.count, author, stop_id
+        _merge_oldest(self._newest, self._most)
 
     def since(self, count: int, *names: str) -> tuple[Author, str] | None:
         """Return author and id of the newest Stop of any of these, or of everything, after the
@@ -54,6 +61,19 @@ class StopOrder:
         known = [self._newest[each] for each in ("", *names) if each in self._newest]
         found = max(known, key=lambda each: each[0], default=None)
         return None if found is None or found[0] <= count else found[1:]
+
+
+N = TypeVar("N", bound=tuple[int, Any] | tuple[int, Any, Any])
+
+
+def _merge_oldest(noted: dict[str, N], most: int) -> None:
+    """Let the oldest of more than `most` things count for everything. They are in the order in which they
+    were noted."""
+    while len(noted) > most:
+        what = next(each for each in noted if each)
+        oldest = noted.pop(what)
+        if "" not in noted or noted[""][0] < oldest[0]:
+            noted[""] = oldest
 
 
 class IdempotentStarts:
