@@ -42,6 +42,27 @@ def test_doubts_of_a_script_for_the_newest_version_are_listed() -> None:
     assert [doubt.action for doubt in found.doubts] == ["Work_2", "Work_0"]
 
 
+def test_what_is_inside_of_a_renamed_action_does_in_the_newest_version_what_it_did() -> None:
+    inner = msgspec.structs.replace(RUN.actions["Work_1"], aid=None)
+    named = f"{RUN.graph_name}__Work__0/Grip_3"
+    deeper = f"{RUN.graph_name}__Work__0__Grip__3/Close_1"
+    actions = RUN.actions | {named: inner, deeper: inner}
+    run = msgspec.structs.replace(RUN, actions=actions)
+    newest = msgspec.structs.replace(renamed(PLAN, Work_0="Reach"), name="other")
+    found = fitted(recorded(run), run, newest)
+    assert outcomes(found) == {
+        "Reach_0": ["on_false"],
+        "Work_1": ["on_error"],
+        "other__Reach__0/Grip_3": ["on_error"],
+        "other__Reach__0__Grip__3/Close_1": ["on_error"],
+    }
+    assert found.doubts == []
+    fewer = msgspec.structs.replace(newest, actions=newest.actions[1:])
+    found = fitted(recorded(run), run, fewer)
+    assert outcomes(found) == {"Work_1": ["on_error"]}
+    assert [doubt.action for doubt in found.doubts] == ["Work_0", named, deeper]
+
+
 def with_speed(value: str) -> Graph:
     plan = sequence("measured", actions=2)
     leaf = f'{{"pvf_type": "number", "pvf_value": {value}}}'

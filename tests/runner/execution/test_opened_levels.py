@@ -9,6 +9,8 @@ import pytest
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.execution.question_commands import AnswerRequest
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.repeats.repeat import NextRequest, RepeatRequest
+from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.runs.earlier import StartFrom
 from action_assistant.runner.runs.views import run_view, time
 from action_assistant.runner.start.admission import GoOnRequest, StepRequest
@@ -16,7 +18,8 @@ from action_assistant.umrf.breakpoints import Breakpoint
 from runner.execution.test_conducted_subgraphs import PICK, TASK, going_on, looking, named, sent
 from runner.execution.test_conductor import Lab, refused, shared
 from runner.execution.test_questions import CONFIRM, line, open_question
-from runner.harness import ANN, BEN, ended, sequence, until, virtual
+from runner.harness import ANN, BEN, at_once, clock_us, ended, sequence, until, virtual
+from runner.start.test_rights_registry import ANN as SIGNED_IN
 
 #: `Pick_0` is a graph of two steps of Scout, then Carrier follows; and a graph whose second step is Carrier's.
 MIXED = shared(sequence("Pick", 2), "Scout", "Carrier")
@@ -235,3 +238,20 @@ async def test_only_a_led_run_opens_sub_graphs() -> None:
         request = msgspec.structs.replace(opened(PICK), engine="David", robots={})
         with pytest.raises(BadInput, match="Only a run that is led"):
             await control.start(request, ANN)
+
+
+@virtual
+async def test_a_repeat_opens_the_sub_graphs_in_each_of_its_runs() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    async with (
+        lab.runner() as control,
+        Repeats.opened(
+            control, lab.harness.journal, clock_us=clock_us, run_in_worker=at_once
+        ) as repeats,
+    ):
+        request = RepeatRequest(start=opened(MIXED), times=2)
+        repeat, _ = await repeats.open(request, ANN, SIGNED_IN)
+        for cell in (1, 2):
+            started = await repeats.start(repeat.id, NextRequest(cell), ANN, SIGNED_IN)
+            assert await ended(control, started.run.id) == "finished"
+        assert [len(lab.david.starts), len(lab.carol.starts)] == [2, 4]

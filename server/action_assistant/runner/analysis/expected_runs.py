@@ -6,7 +6,7 @@ a graph, such a script and the course that they took; simulating it later, with 
 newer product, must take the same course.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Final, Literal, TypeAlias
 
 import msgspec
@@ -15,6 +15,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.journal.events import Event
+from action_assistant.runner.analysis.levels import LevelPlace, part_of, places_of
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Author, RunSubgraph
 from action_assistant.runner.runs.run import Run
@@ -136,26 +137,47 @@ def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
 
 def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
     """Return a run as a script (`found`) for another version of its graph: renamed actions keep
-    their behaviour. An action that never ran gets the simulator's default, and a doubt."""
+    their behaviour, and so do those inside of them. An action that never ran gets the simulator's
+    default, and a doubt."""
     by_aid = {action.aid: name for name, action in run.actions.items() if action.aid is not None}
     behaviours: dict[str, list[dict[str, Any]]] = {}
     used: set[str] = set()
     doubts: list[Doubt] = []
+    names: dict[str, str] = {}  # in this version, by that of the run
     for action in graph.actions:
         if action.missing:
             continue
         name = by_aid.get(action.key, action.full_name)
+        names[name] = action.full_name
         if name in found.behaviours:
             used.add(name)
             behaviours[action.full_name] = found.behaviours[name]
         else:
             why = "It never ran in that run" if name in run.actions else "That run did not have it"
             doubts.append(Doubt(action.full_name, f"{why}; it ends true after a second."))
-    inside = {name: calls for name, calls in found.behaviours.items() if "/" in name}
-    gone = sorted(found.behaviours.keys() - used - inside.keys())
+    for name, place in places_of(run).items():
+        if name in found.behaviours and name not in used and (place.levels or not place.known):
+            now = name if not place.levels else _named_inside(place, graph, names)
+            if now is not None:
+                used.add(name)
+                behaviours[now] = found.behaviours[name]
+    gone = sorted(found.behaviours.keys() - used)
     doubts += [Doubt(name, "This version does not have it any more.") for name in gone]
-    kept = [doubt for doubt in found.doubts if doubt.action in used | inside.keys()]
-    return Recorded(behaviours | inside, [*kept, *doubts])
+    kept = [doubt for doubt in found.doubts if doubt.action in used]
+    return Recorded(behaviours, [*kept, *doubts])
+
+
+def _named_inside(place: LevelPlace, graph: Graph, names: Mapping[str, str]) -> str | None:
+    """Return the running name in another version (`graph`) of an action inside of sub-graphs; None if the
+    outermost of these is not there any more. `names`: of the actions of that version, by those of the
+    run."""
+    first, *deeper = place.levels
+    if first not in names:
+        return None
+    part = part_of(graph.name, names[first])
+    for level in deeper:
+        part = part_of(part, level)
+    return f"{part}/{place.name}"
 
 
 def _spread(action: ActionRun) -> Iterable[str]:
