@@ -2,8 +2,9 @@
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { useRef } from "react";
 import { runnerAt } from "./client";
+import { CONDUCTED } from "./led-runs";
 import { useLive } from "./page-link";
-import { type Run, type StartOrder, startBody, type Watching } from "./runs";
+import { type Started, type StartOrder, startBody, type Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
 export type Queue = RunnerApi["QueueShown"];
@@ -53,9 +54,10 @@ export function useQueue(enabled = true) {
 
 /** Put a start into the queue of its robots, once; it is not sent again. Nothing starts by that. */
 export async function enterQueue(order: StartOrder): Promise<Queue> {
-  const [engine = ""] = order.engines;
+  const [engine = "", ...others] = order.engines;
   const start = { ...(await startBody(order)), engine };
-  const body = { start } as RunnerApi["QueueRequest"];
+  const engines = others.length > 0 ? { engines: order.engines } : {};
+  const body = { start, ...engines } as RunnerApi["QueueRequest"];
   return runnerAt(order.runner).post("/api/queue", { body });
 }
 
@@ -67,15 +69,20 @@ function lookAtEntry(runner: string, entry: string, watching: Watching): Promise
 /** Return the request id of the one start of an entry. */
 export const requestOfEntry = (entry: string): string => `queue/${entry}`;
 
+/** Return the engines of the runs that an entry becomes. */
+export const enginesOfEntry = ({ engine, robots }: QueueEntry): readonly string[] =>
+  engine === CONDUCTED || robots.length < 2 ? [engine] : robots;
+
 /** Start an entry at its turn, exactly as it was looked at. */
-export function startEntry(
+export async function startEntry(
   runner: string,
   entry: string,
   look: string,
   watching: Watching,
-): Promise<Run> {
-  const path = { entry };
-  return runnerAt(runner).post("/api/queue/{entry}/start", { path, body: { look, watching } });
+): Promise<Started> {
+  const request = { path: { entry }, body: { look, watching } };
+  const found = await runnerAt(runner).post("/api/queue/{entry}/start", request);
+  return { runs: [found, ...found.others], failed: found.failed };
 }
 
 /** Move an entry before another one, or to the end by "". */

@@ -1,5 +1,6 @@
 /** The turn of an entry of the queue: the look before its start, what mends it on the spot, and the start. */
 import { Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
@@ -7,6 +8,7 @@ import { useVersions, versionName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import {
+  enginesOfEntry,
   type QueueEntry,
   type QueueLook,
   requestOfEntry,
@@ -123,12 +125,20 @@ function useStartEntry(entry: QueueEntry) {
   return useMutation({
     mutationFn: ({ look, watching }: { look: string; watching: Watching }) => {
       const [request, what] = [requestOfEntry(entry.id), isolated(entry.graph_name)];
-      const start = { request, graph: entry.graph ?? "", what, engines: [entry.engine] };
+      const start = { request, graph: entry.graph ?? "", what, engines: enginesOfEntry(entry) };
       return sendNoted(start, () => startEntry(runner, entry.id, look, watching));
     },
-    onSuccess: (run) => {
-      live?.learn(run);
-      go(`/runs/${run.id}`);
+    onSuccess: ({ runs, failed }) => {
+      for (const run of runs) live?.learn(run);
+      for (const [robot, why] of Object.entries(failed))
+        notifications.show({
+          color: "red",
+          title: `Not started on ${isolated(robot)}`,
+          message: why,
+          autoClose: false,
+        });
+      const [first] = runs;
+      if (first) go(`/runs/${first.id}`);
     },
   });
 }

@@ -11,6 +11,30 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
+def add_options(run: argparse.ArgumentParser) -> None:
+    """Add the options by which `run` puts a start into the queue."""
+    run.add_argument(
+        "--queue",
+        action="store_true",
+        help="put it into the queue of its robots, print its place and return: queue start",
+    )
+    run.add_argument(
+        "--together",
+        action="append",
+        default=[],
+        metavar="ROBOT",
+        help="with --queue: this robot starts it too, at one turn; again for each",
+    )
+
+
+def is_asked(options: argparse.Namespace) -> bool:
+    """Return whether the options of `run` ask for the queue. Raise CannotStart for robots that start
+    together without it."""
+    if options.together and not options.queue:
+        raise CannotStart("--together is for a start that waits: --queue.")
+    return bool(options.queue)
+
+
 def put(server: Server, start: dict[str, Any], options: argparse.Namespace) -> int:
     """Put a start into the queue of its robots, print its id and why it waits, and return 0. `start`:
     the body of a request to start. Nothing waits for its turn: in the simulator it starts by itself,
@@ -19,6 +43,8 @@ def put(server: Server, start: dict[str, Any], options: argparse.Namespace) -> i
         raise CannotStart("--watching is said when it starts: queue start ENTRY --watching ROBOT.")
     moves = bool(set(start.get("robots", {}).values() or {start["engine"]}) - {"simulator"})
     wanted = {"start": start, "by_itself": not moves and not start.get("behaviours")}
+    if options.together:
+        wanted["engines"] = [start["engine"], *options.together]
     answer = server.runner("POST", "/api/queue", json=wanted)
     entry = answer.headers["location"].rsplit("/", 1)[-1]
     print(entry, flush=True)
@@ -123,9 +149,12 @@ def _start(options: argparse.Namespace) -> int:
                 print(f"to start it all the same: queue start {options.entry} --look {look}")
                 return 1
         asked = {"look": look, "watching": watching}
-        run = server.runner("POST", f"{path}/start", json=asked).json()
-    print(run["id"], flush=True)
-    return 0
+        started = server.runner("POST", f"{path}/start", json=asked).json()
+    for run in [started, *started["others"]]:
+        print(run["id"], flush=True)
+    for robot, why in started["failed"].items():
+        print(one_line(f"not started on {robot}: {why}"))
+    return 1 if started["failed"] else 0
 
 
 def _move(options: argparse.Namespace) -> int:

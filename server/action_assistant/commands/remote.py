@@ -127,11 +127,7 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     )
     _add_from(run)
     repeats.add_options(run)
-    run.add_argument(
-        "--queue",
-        action="store_true",
-        help="put it into the queue of its robots, print its place and return: queue start",
-    )
+    queue.add_options(run)
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
@@ -405,7 +401,7 @@ def _run(options: argparse.Namespace) -> int:
             order["override"] = {"codes": codes.split(","), "reason": reason}
         if script is not None:
             order["script"] = script
-        if options.queue:
+        if queue.is_asked(options):
             if repeats.is_asked(options):
                 raise CannotStart("A repeat cannot wait in the queue.")
             return queue.put(server, order, options)

@@ -85,13 +85,19 @@ class History:
         if opened is None:
             self.faults.append(f"{run} left for {robot}, and no run is open")
             return
-        name = opened.run.request_id
+        name = self._pressed(opened.run.request_id)
         if name not in self.presses:
             self.faults.append(f"{run} left for {robot} without a press")
         elif self.stops[name] != self.presses[name]:
             self.faults.append(f"{run} left for {robot} after a Stop")
         if opened.run.held is not None or opened.run.desired == "stopped":
             self.faults.append(f"{run} left for {robot} while it was held or stopped")
+
+    def _pressed(self, request: str) -> str:
+        """Return the id of the start whose run has this request id: those of a start on several robots
+        have their robot behind it."""
+        whole = request.rpartition("/")[0]
+        return whole if whole in self.robots_of else request
 
     async def live(self) -> None:
         """Live through it, and through what comes after its last restart."""
@@ -131,7 +137,7 @@ class History:
         journal.down = False
 
     def _request(self) -> QueueRequest:
-        match self.chance.randrange(8):
+        match self.chance.randrange(9):
             case 0:
                 return QueueRequest(start=order(sequence("sim"), script=QUICK), by_itself=True)
             case 1 | 2:
@@ -139,6 +145,9 @@ class History:
                 return QueueRequest(start=led(graph, lost=self.chance.choice(["stop", "wait"])))
             case 3:
                 return QueueRequest(start=asked_of(line("Scout", CONFIRM, "Scout")))
+            case 4:
+                start = order(sequence("each"), engine="David")
+                return QueueRequest(start=start, engines=self.chance.choice([ROBOTS, ROBOTS[::-1]]))
             case _:
                 return on(self.chance.choice(ROBOTS))
 
@@ -180,7 +189,7 @@ class History:
             for each in queues.entries
             if not set(robots).isdisjoint(each.entered.robots)
         }
-        for name in {request} | concerned:
+        for name in {self._pressed(request)} | concerned:
             self.stops[name] += 1
         with suppress(Refused):
             await control.stop(run, author(BEN))

@@ -22,10 +22,11 @@ from action_assistant.runner.queues.entry import (
     QueueReady,
     QueueRequest,
     TurnRequest,
+    closing_of,
     stream_of,
 )
 from action_assistant.runner.queues.robot_queue import Entry, RobotQueue
-from action_assistant.runner.queues.service import Queues, closing_of
+from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.queues.views import queue_view
 from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs.doubts import Doubt

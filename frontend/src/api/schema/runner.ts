@@ -877,6 +877,75 @@ export interface RunnerApi {
         hidden: boolean;
     };
     /**
+     * EntryStarted
+     * @description The run that an entry has become. Of a start on several robots: `others`, the runs beside it, and
+     *     `failed`, the robots that nothing was sent to, and why.
+     */
+    EntryStarted: {
+        id: string;
+        number: number;
+        graph: string | null;
+        graph_name: string;
+        version: string | null;
+        digest: string;
+        engine: string;
+        simulated: boolean;
+        author: RunnerApi["Author"];
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired: "paused" | "running" | "stopped";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        proof_at: string | null;
+        unknown_since: string | null;
+        unconfirmed: string | null;
+        at_rest: RunnerApi["AtRestShown"] | null;
+        moves_again_at: string | null;
+        group: string | null;
+        /** Format: date-time */
+        requested_at: string;
+        started_at: string | null;
+        ended_at: string | null;
+        took: RunnerApi["DurationBounds"] | null;
+        stopped_by: RunnerApi["Author"] | null;
+        detail: string;
+        alarms: RunnerApi["AlarmShown"][];
+        recorded: boolean;
+        robots: {
+            [key: string]: string;
+        } | null;
+        held: RunnerApi["HeldShown"] | null;
+        breakpoints?: RunnerApi["Breakpoint"][];
+        lead?: RunnerApi["Author"];
+        batons?: string[];
+        watching?: string[];
+        hidden?: boolean;
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        sent_digest?: string;
+        from?: RunnerApi["StartFromShown"];
+        people?: {
+            [key: string]: string;
+        };
+        questions?: RunnerApi["QuestionShown"][];
+        pauses?: RunnerApi["PauseShown"][];
+        repeat?: RunnerApi["PartOfRepeat"];
+        like: string | null;
+        behaviours: boolean;
+        actions: {
+            [key: string]: RunnerApi["ActionShown"];
+        };
+        log: RunnerApi["MessageShown"][];
+        rests?: RunnerApi["RobotRestShown"][];
+        others: RunnerApi["RunShown"][];
+        failed: {
+            [key: string]: string;
+        };
+    };
+    /**
      * Expect
      * @description A request to expect a course under a name: that of a `run`, or that of a graph in a dry-run
      *     with this script. `subgraphs`: the graphs inside of that graph.
@@ -2001,12 +2070,15 @@ export interface RunnerApi {
     /**
      * QueueRequest
      * @description Puts a start into the queue. `by_itself`: in the simulator alone, it starts when its turn comes.
-     *     The `request_id` of the start names the entry: it is put there once.
+     *     The `request_id` of the start names the entry: it is put there once. `engines`: of a start on several
+     *     robots all of these, the `engine` of the start among them; each gets the whole graph.
      */
     QueueRequest: {
         start: RunnerApi["StartRequest"];
         /** @default false */
         by_itself?: boolean;
+        /** @default [] */
+        engines?: string[];
     };
     /**
      * QueueShown
@@ -4451,12 +4523,12 @@ interface RunnerOperations {
         responses: {
             200: {
                 content: {
-                    "application/json": RunnerApi["RunShown"];
+                    "application/json": RunnerApi["EntryStarted"];
                 };
             };
             201: {
                 content: {
-                    "application/json": RunnerApi["RunShown"];
+                    "application/json": RunnerApi["EntryStarted"];
                 };
             };
         };

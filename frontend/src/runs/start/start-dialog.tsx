@@ -422,11 +422,9 @@ export function StartDialog(props: Props) {
   const waitObstacle =
     beginning || said.drill
       ? "A start like this cannot wait"
-      : asked.length > 1
-        ? "One robot, or a led run, can wait"
-        : (way.missing ??
-          given.obstacle ??
-          (look.isPlaceholderData || breakpoints === undefined ? "Looking …" : null));
+      : (way.missing ??
+        given.obstacle ??
+        (look.isPlaceholderData || breakpoints === undefined ? "Looking …" : null));
   const begin = () => {
     rememberEngines(graph, asked);
     if (order !== null) rememberLed(graph, order);

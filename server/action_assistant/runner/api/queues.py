@@ -11,6 +11,7 @@ from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, b
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.run_guard import require_run, unseen_by
 from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.execution.start_pipeline import Grouped
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.queues.entry import (
     LookRequest,
@@ -25,13 +26,21 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sight import HIDDEN_GRAPH
 from action_assistant.runner.start.admission import decoded
-from action_assistant.runner.start.orders import engines_of
+from action_assistant.runner.start.kept_starts import group_of
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.auth.access import Needs, identity_of, require
 from action_assistant.web.server.openapi import answer, reads
 
 _Asking = Request[Any, Any, Any]
+
+
+class EntryStarted(views.RunShown, frozen=True, kw_only=True):
+    """The run that an entry has become. Of a start on several robots: `others`, the runs beside it, and
+    `failed`, the robots that nothing was sent to, and why."""
+
+    others: list[views.RunShown]
+    failed: dict[str, str]
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
@@ -63,8 +72,9 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def put(request: _Asking) -> Response[QueueShown]:
         async with body_of(request, services.body_limit) as body:
             wanted = decoded(body, QueueRequest)
-            with noted(services, request, refusal_of(wanted.start)):
-                if engines_of(wanted.start):
+            whole = group_of(wanted.start, wanted.engines) if wanted.engines else wanted.start
+            with noted(services, request, refusal_of(whole)):
+                if wanted.robots:
                     require(request, "operate")
                 author, me = author_of(request), identity_of(request)
                 entry, fresh = await services.queues.put(wanted, author, me)
@@ -96,13 +106,13 @@ def _of_entry(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/queue/{entry:str}/start",
         operation_id="startEntry",
         description="Of people only. `look` is that of the newest look: another one is 409 with "
-        "`where.differs`. Starting an entry again answers its run.",
+        "`where.differs`. Starting an entry again answers its run, ",
         summary="Start an entry of the queue at its turn, exactly as it was looked at",
         opt=reads(TurnRequest),
-        responses={200: answer(views.RunShown, text="It had been started before")},
+        responses={200: answer(EntryStarted, text="It had been started before")},
         guards=[StartNeeds(services, "start", of_people=True)],
     )
-    async def start(entry: str, request: _Asking) -> Response[views.RunShown]:
+    async def start(entry: str, request: _Asking) -> Response[EntryStarted]:
         asked = decoded(await request.body(), TurnRequest)
         known = _waits(services, entry)
         if known is not None:
@@ -112,12 +122,20 @@ def _of_entry(services: RunnerServices) -> list[ControllerRouterHandler]:
                 require(request, "operate")
             author, me = author_of(request), identity_of(request)
             started = await services.queues.start(entry, asked, author, me)
+        runs = started.runs if isinstance(started, Grouped) else [started.run]
         if not started.fresh:
-            await require_run(services, request, started.run.id)
+            for run in runs:
+                await require_run(services, request, run.id)
+        first, *others = (views.run_view(run) for run in runs)
+        shown = EntryStarted(
+            **{name: getattr(first, name) for name in first.__struct_fields__},
+            others=others,
+            failed=started.failed if isinstance(started, Grouped) else {},
+        )
         return Response(
-            views.run_view(started.run),
+            shown,
             status_code=201 if started.fresh else 200,
-            headers={"location": f"/api/runs/{started.run.id}"},
+            headers={"location": f"/api/runs/{first.id}"},
         )
 
     @post(

@@ -7,18 +7,19 @@ Its stream `queue/ID` says who put it there, what was looked at, and how it left
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict
-from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.errors import BadInput, Conflict, Unavailable
+from action_assistant.journal.events import Event
+from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.start.admission import StartRequest, Watching
-from action_assistant.runner.start.kept_starts import ordered_in
+from action_assistant.runner.start.kept_starts import ordered_in, start_of
 from action_assistant.runner.start.orders import engines_of
 from action_assistant.runner.start.preflight import Item, Preflight
 from action_assistant.umrf.start_values import StartValues
@@ -45,10 +46,17 @@ _Id = Annotated[str, msgspec.Meta(max_length=100)]
 
 class QueueRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Puts a start into the queue. `by_itself`: in the simulator alone, it starts when its turn comes.
-    The `request_id` of the start names the entry: it is put there once."""
+    The `request_id` of the start names the entry: it is put there once. `engines`: of a start on several
+    robots all of these, the `engine` of the start among them; each gets the whole graph."""
 
     start: StartRequest
     by_itself: bool = False
+    engines: Annotated[tuple[_Id, ...], msgspec.Meta(max_length=20)] = ()
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots for which it waits, sorted."""
+        return tuple(sorted(set(self.engines))) or engines_of(self.start)
 
 
 class LookRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -110,6 +118,17 @@ class QueueEntered(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True
     by_itself: bool = False
     inside: tuple[str, ...] = ()
     unsighted: bool = False
+
+    @property
+    def together(self) -> tuple[str, ...]:
+        """The robots of a start on several robots; none for any other start, as for that of a led run."""
+        return self.robots if self.engine != CONDUCTED and len(self.robots) > 1 else ()
+
+    @property
+    def requests(self) -> tuple[str, ...]:
+        """The request ids of the runs that it may become."""
+        whole = request_of(self.entry)
+        return tuple(f"{whole}/{robot}" for robot in self.together) or (whole,)
 
 
 class QueueStartKept(msgspec.Struct, frozen=True):
@@ -204,7 +223,8 @@ def entry_id(request_id: str) -> str:
 
 
 def request_of(entry: str) -> str:
-    """Return the request id of the one start of an entry."""
+    """Return the request id of the one start of an entry. The runs of a start on several robots have it
+    with their robot behind it."""
     return f"{_PREFIX}{entry}"
 
 
@@ -218,9 +238,24 @@ def told(closed: QueueClosed, *, whole: bool = False) -> str:
     return closed.text
 
 
+def closing_of(closed: QueueClosed) -> str:
+    """Return the name of the closing of a queue, by which a person says which one they saw."""
+    return str(closed.at)
+
+
+def kept_in(events: Iterable[Event]) -> StartRequest:
+    """Return the start of an entry. Raise Unavailable if it is not among these events, or damaged."""
+    kept = next((each.body for each in events if each.kind == QueueStartKept.kind), b"")
+    try:
+        return start_of(msgspec.json.decode(kept, type=QueueStartKept).start)
+    except msgspec.DecodeError as damaged:
+        raise Unavailable("The start of this entry cannot be read.") from damaged
+
+
 def order_of(request: QueueRequest) -> str:
     """Return the hash of all that an entry orders."""
-    return hashlib.sha256(ordered_in(request.start) + b"%d" % request.by_itself).hexdigest()
+    more = msgspec.json.encode(request.robots) if request.engines else b""
+    return hashlib.sha256(ordered_in(request.start) + b"%d" % request.by_itself + more).hexdigest()
 
 
 def require_queueable(request: QueueRequest) -> None:
@@ -233,9 +268,62 @@ def require_queueable(request: QueueRequest) -> None:
     if start.watching:
         text = "A person says that they watch when it starts, not when it is put into the queue."
         raise BadInput(text, where={"path": "/start/watching"})
-    if request.by_itself and (engines_of(start) or start.behaviours):
+    if request.engines:
+        names = set(request.engines)
+        if start.engine not in names or not names.isdisjoint({SIMULATOR, CONDUCTED}):
+            text = "A start on several robots names robots only, that of the start among them."
+            raise BadInput(text, where={"path": "/engines"})
+    if request.by_itself and (request.robots or start.behaviours):
         text = "A person starts whatever may move something: by itself a start goes in the simulator alone."
         raise BadInput(text, where={"path": "/by_itself"})
+
+
+def entered_of(
+    request: QueueRequest, author: Author, at: int, name: str, seen: Looked, *, unsighted: bool
+) -> QueueEntered:
+    """Return the event that puts a start there. `name`: of its graph; `seen`: the look of its person."""
+    start = request.start
+    return QueueEntered(
+        at=at,
+        entry=entry_id(start.request_id),
+        request_id=start.request_id,
+        order=order_of(request),
+        author=author,
+        graph=start.graph,
+        graph_name=name,
+        version=start.version,
+        digest=start.digest,
+        engine=start.engine,
+        robots=request.robots,
+        seen=seen,
+        values=start.values,
+        by_itself=request.by_itself,
+        inside=tuple(each.graph for each in start.subgraphs if each.graph)
+        + (start.sight.graphs if start.sight is not None else ()),
+        unsighted=unsighted,
+    )
+
+
+def waits_of(
+    entries: Iterable[Sequence[str]],
+    closed: Collection[str],
+    busy: Mapping[str, Sequence[Waiting]],
+) -> Iterator[tuple[Waiting, ...]]:
+    """Yield why each entry waits, nothing at its turn: when it is the first for all of its robots, and
+    these are free. `entries`: the queues of each, in the one order that all queues have, so that no two
+    wait for each other; `closed`: the queues that are, `busy`: why a robot is not free. One that waits for
+    a closed queue keeps nobody waiting."""
+    ahead: Counter[str] = Counter()
+    for names in entries:
+        shut = [Waiting(name, "closed") for name in names if name in closed]
+        waits = list(shut)
+        for name in names:
+            if not shut:
+                if ahead[name]:
+                    waits.append(Waiting(name, "behind", behind=ahead[name]))
+                ahead[name] += 1
+            waits += busy[name]
+        yield tuple(waits)
 
 
 def looked_of(looks: Sequence[Preflight], rules: Mapping[str, Rules]) -> Looked:
@@ -296,7 +384,7 @@ def require_waitable(start: StartRequest, looks: Iterable[Preflight]) -> None:
 
 def require_openable(start: StartRequest, looks: Iterable[Preflight], robot: str) -> None:
     """Raise Conflict if a pre-flight finds something on a robot that keeps its queue closed."""
-    of_robot = [each for each in looks if each.engine in {robot, start.engine}]
+    of_robot = [each for each in looks if each.engine in {robot, CONDUCTED}]
     _require_none(_blocking(start, of_robot, _AT_THE_START))
 
 

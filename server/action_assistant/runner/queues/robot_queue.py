@@ -8,6 +8,7 @@ from action_assistant.runner.execution.doubts import Closable
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.queues.entry import QueueClosed, QueueEntered, Waiting, queue_names_of
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sight import RunGraphs
 from action_assistant.runner.start.orders import InQueue
 from action_assistant.runner.start.preflight import Preflight
@@ -34,7 +35,8 @@ class RobotQueue(Closable):
 class Entry:
     """A start in the queue. `by`: in whose name it may start by itself; `waits`: why it waits, empty when
     its turn has come; `ready_at`: since when that is so, µs UTC; `differs`: what is no longer as its
-    person saw it, by the look of the runner; `turn`: one start, or removal, at a time."""
+    person saw it, by the look of the runner; `turn`: one start, or removal, at a time; `became`: the first
+    run of a start on several robots, which leaves the queue when all of them have been tried."""
 
     def __init__(self, entered: QueueEntered) -> None:
         self.entered = entered
@@ -43,6 +45,7 @@ class Entry:
         self.ready_at: int | None = None
         self.differs: tuple[str, ...] = ()
         self.turn = anyio.Lock()
+        self.became: Run | None = None
 
     @property
     def id(self) -> str:

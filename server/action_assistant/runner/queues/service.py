@@ -16,15 +16,14 @@ from typing import Final
 import anyio
 import msgspec
 
-from action_assistant.errors import Conflict, Forbidden, NotFound, Refused, Unavailable
-from action_assistant.journal.events import Event
+from action_assistant.errors import Conflict, Forbidden, NotFound, Refused
 from action_assistant.kit.clock import ClockUs
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.execution.doubts import DoubtWatch
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.execution.start_pipeline import Started
-from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.execution.start_pipeline import Grouped, Started
+from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.queues.entry import (
     MOST,
     MOST_OF_ONE,
@@ -41,9 +40,12 @@ from action_assistant.runner.queues.entry import (
     QueueStartKept,
     TurnRequest,
     Waiting,
+    closing_of,
     differences,
     digest_of,
+    entered_of,
     entry_id,
+    kept_in,
     looked_of,
     named,
     order_of,
@@ -55,6 +57,7 @@ from action_assistant.runner.queues.entry import (
     stream_of,
     stream_of_robot,
     told,
+    waits_of,
 )
 from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
 from action_assistant.runner.runs import queries
@@ -64,8 +67,8 @@ from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import QueuedStart
 from action_assistant.runner.start.admission import StartRequest, Watching
-from action_assistant.runner.start.kept_starts import graph_of, group_of, start_of, text_of
-from action_assistant.runner.start.orders import InQueue, engines_of, overridden_in, watched_in
+from action_assistant.runner.start.kept_starts import graph_of, group_of, text_of
+from action_assistant.runner.start.orders import InQueue, overridden_in, watched_in
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.rights import Denied, may
@@ -176,18 +179,31 @@ class Queues:
         """Return the one start of an entry. Raise BadInput if a person watches a robot that does not
         move, Unavailable if it cannot be read."""
         watched_in(watching, entry.entered.robots)
-        start = _kept_in(await self._journal.read(stream_of(entry.id)))
+        start = kept_in(await self._journal.read(stream_of(entry.id)))
         return msgspec.structs.replace(start, request_id=request_of(entry.id), watching=watching)
 
     async def _look(
-        self, start: StartRequest, seen: Looked, identity: Identity, turn: InQueue | None = None
+        self,
+        start: StartRequest,
+        robots: tuple[str, ...],
+        seen: Looked,
+        identity: Identity,
+        turn: InQueue | None = None,
     ) -> tuple[Look, Looked]:
-        looks = await self._control.look(group_of(start), identity.person.id, identity, turn)
+        engines = () if start.engine == CONDUCTED else robots
+        group = group_of(start, engines)
+        looks = await self._control.look(group, identity.person.id, identity, turn)
         of = self._control.rights.of
-        now = looked_of(looks, {name: of(name).rules for name in engines_of(start)})
+        now = looked_of(looks, {name: of(name).rules for name in robots})
         differs = differences(seen, now, looks)
         digest = digest_of(now, looks, None if turn is None else turn.ready_at)
         return Look(tuple(looks), differs, digest, overridden_in(start)), now
+
+    async def _look_at(
+        self, entry: Entry, start: StartRequest, identity: Identity, turn: InQueue | None = None
+    ) -> Look:
+        robots, seen = entry.entered.robots, entry.entered.seen
+        return (await self._look(start, robots, seen, identity, turn))[0]
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
         """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
@@ -195,7 +211,7 @@ class Queues:
         entry = self.find(id_)
         start = await self._start_in(entry, watching)
         self._survey()
-        return (await self._look(start, entry.entered.seen, identity, entry.often))[0]
+        return await self._look_at(entry, start, identity, entry.often)
 
     # --- put, move, remove --------------------------------------------------------------------
 
@@ -206,7 +222,7 @@ class Queues:
         new. Nothing is started by it, except in the simulator where the person has said so. Raise a
         subclass of Refused if it cannot wait, or cannot be stored."""
         require_queueable(request)
-        start, robots = request.start, engines_of(request.start)
+        start, robots = request.start, request.robots
         graphs = (start.graph, *(each.graph for each in start.subgraphs))
         self._control.sight.require_graphs(identity, *graphs)
         own_queues = [self._queue_of(name) for name in queue_names_of(robots)]
@@ -219,27 +235,11 @@ class Queues:
                 return known, False
             self._require_capacity(author)
             graph = await self._run_in_worker(graph_of, start)
-            look, seen = await self._look(start, Looked({}), identity)
+            look, seen = await self._look(start, robots, Looked({}), identity)
             require_waitable(start, look.looks)
-            entered = QueueEntered(
-                at=self._clock_us(),
-                entry=entry_id(start.request_id),
-                request_id=start.request_id,
-                order=order_of(request),
-                author=author,
-                graph=start.graph,
-                graph_name=graph.name,
-                version=start.version,
-                digest=start.digest,
-                engine=start.engine,
-                robots=robots,
-                seen=seen,
-                values=start.values,
-                by_itself=request.by_itself,
-                inside=tuple(each.graph for each in start.subgraphs if each.graph)
-                + (start.sight.graphs if start.sight is not None else ()),
-                unsighted=start.sight is None and self._control.sight.has_rules,
-            )
+            unsighted = start.sight is None and self._control.sight.has_rules
+            now = self._clock_us()
+            entered = entered_of(request, author, now, graph.name, seen, unsighted=unsighted)
             return await self._enter(entered, request, identity)
         finally:
             self._putting -= Counter({start.request_id: 1})
@@ -363,28 +363,17 @@ class Queues:
     # --- whose turn it is ---------------------------------------------------------------------
 
     def _survey(self) -> None:
-        """Say anew of each entry why it waits. One that waits for a closed queue keeps nobody waiting."""
+        """Say anew of each entry why it waits."""
         if not self._entries:
             return
-        ahead: dict[str, int] = {}
         busy = {name: tuple(self._busy(name)) for name in self._queues}
-        is_changed = False
-        for entry in tuple(self._entries):
-            closed = [
-                Waiting(name, "closed")
-                for name in entry.queue_names
-                if not self._queues[name].is_open
-            ]
-            waits = list(closed)
-            for name in entry.queue_names:
-                if not closed:
-                    if behind := ahead.get(name, 0):
-                        waits.append(Waiting(name, "behind", behind=behind))
-                    ahead[name] = behind + 1
-                waits += busy[name]
-            if entry.waits != tuple(waits) or (entry.ready_at is None) == (not waits):
+        closed = {name for name, queue in self._queues.items() if not queue.is_open}
+        entries, is_changed = tuple(self._entries), False
+        every = waits_of([each.queue_names for each in entries], closed, busy)
+        for entry, waits in zip(entries, every, strict=True):
+            if entry.waits != waits or (entry.ready_at is None) == (not waits):
                 is_changed = True
-                entry.waits = tuple(waits)
+                entry.waits = waits
                 was_ready, entry.ready_at = entry.ready_at, None
                 if not waits:
                     entry.ready_at = was_ready or self._clock_us()
@@ -435,8 +424,7 @@ class Queues:
             if identity is None:
                 raise Forbidden(f"{entered.author.name or 'Its person'} is not signed in any more.")
             start = await self._start_in(entry, {})
-            look, _ = await self._look(start, entered.seen, identity)
-            found = look.differs
+            found = (await self._look_at(entry, start, identity)).differs
         except Refused as refused:
             found = (refused.detail,)
         if entry.ready_at != ready_at or entry not in self._entries:
@@ -465,8 +453,8 @@ class Queues:
 
     async def start(
         self, id_: str, asked: TurnRequest, author: Author, identity: Identity
-    ) -> Started:
-        """Start an entry whose turn it is, and return its run; that of one which was started before is
+    ) -> Started | Grouped:
+        """Start an entry whose turn it is, and return its run, or its runs; what was started before is
         returned as it is. Raise Conflict if it has to wait, or is not as it was looked at, NotFound if
         it was removed, and what a start raises."""
         entry = next((each for each in self._entries if each.id == id_), None)
@@ -477,7 +465,8 @@ class Queues:
             if entry not in self._entries:
                 return await self._started(id_)
             start = await self._start_in(entry, asked.watching)
-            look, _ = await self._look(start, entry.entered.seen, identity, entry.often)
+            turn = InQueue(entry.id, ready_at)
+            look = await self._look_at(entry, start, identity, turn)
             if look.digest != asked.look:
                 text = "It is not as you have looked at it. Look again."
                 if look.differs:
@@ -487,16 +476,29 @@ class Queues:
 
     async def _start(
         self, entry: Entry, start: StartRequest, ready_at: int, author: Author, identity: Identity
-    ) -> Started:
+    ) -> Started | Grouped:
         """Start an entry whose turn came at `ready_at`. Nothing waits between the look at the queue and
         the start, which takes note of the Stops pressed so far in that same step. Raise Conflict if
         its queue was closed since then, although it is open again."""
         if self._require_turn(entry) != ready_at:
             raise Conflict("Its queue was closed since, or a robot was not free. Look again.")
         turn = InQueue(entry.id, ready_at)
-        started = await self._control.start(start, author, identity, often=turn)
-        self._leave(entry, started.run)
-        return started
+        together = entry.entered.together
+        if not together:
+            started = await self._control.start(start, author, identity, often=turn)
+            self._leave(entry, started.run)
+            return started
+        group = group_of(start, together)
+        try:
+            grouped = await self._control.start_group(group, author, identity, often=turn)
+        finally:
+            if entry.became is not None:
+                self._leave(entry, entry.became)
+        if not grouped.runs:
+            failed = [f"{robot}: {why}" for robot, why in grouped.failed.items()]
+            raise Conflict(f"Nothing was started. {' '.join(failed)}", where={"path": "/start"})
+        self._leave(entry, grouped.runs[0])
+        return grouped
 
     def _require_turn(self, entry: Entry) -> int:
         """Return since when it is the turn of an entry, µs UTC. Raise Conflict if it has to wait."""
@@ -515,18 +517,22 @@ class Queues:
         assert entry.ready_at is not None
         return entry.ready_at
 
-    async def _started(self, id_: str) -> Started:
-        """Return the run that an entry has become. Raise NotFound if it has become none."""
-        rows = await self._journal.query(queries.by_request(request_of(id_)))
+    async def _started(self, id_: str) -> Started | Grouped:
+        """Return what an entry has become. Raise NotFound if that is nothing."""
+        rows = await self._journal.query(queries.of_start(request_of(id_)))
         if not rows:
             raise NotFound("This is not in the queue: it was removed, or never was.")
-        return Started(await self._control.find(rows[0].id), fresh=False)
+        runs = [await self._control.find(row.id) for row in rows]
+        if runs[0].group is None:
+            return Started(runs[0], fresh=False)
+        return Grouped(runs[0].group, runs, {}, fresh=False)
 
     def _leave(self, entry: Entry, run: Run) -> None:
         """Take out an entry that has become a run, in this step, and store that."""
         if entry not in self._entries:
             return
-        self._robots_of.put(run.id, frozenset(entry.queue_names))
+        if run.group is None:
+            self._robots_of.put(run.id, frozenset(entry.queue_names))
         event = QueueLeft(at=self._clock_us(), run=run.id)
         self._tasks.start_soon(self._store, stream_of(entry.id), event)
         self._forget(entry)
@@ -577,7 +583,8 @@ class Queues:
         self._tasks.start_soon(self._store, stream_of_robot(queue.name), event, by)
         for entry in self._entries:
             if queue.name in entry.queue_names and entry.turn.locked():
-                self._control.hold_back(request_of(entry.id), "Its queue was closed meanwhile.")
+                for request in entry.entered.requests:
+                    self._control.hold_back(request, "Its queue was closed meanwhile.")
         self._survey()
         self._changed()
 
@@ -599,8 +606,7 @@ class Queues:
         standing = self._doubts.standing(queue)
         entry = self._first_seen(queue, identity)
         start = await self._start_in(entry, {})
-        look, _ = await self._look(start, entry.entered.seen, identity)
-        require_openable(start, look.looks, robot)
+        require_openable(start, (await self._look_at(entry, start, identity)).looks, robot)
         event = QueueOpened(at=self._clock_us(), author=author)
         with anyio.CancelScope(shield=True):
             await self._journal.append(stream_of_robot(robot), [draft_of(event, author.id)])
@@ -647,8 +653,10 @@ class Queues:
             known = self._robots_of.get(id_) or frozenset()
             self._robots_of.put(id_, known.union(run.robots))
         for entry in self._entries if run.request_id.startswith(stream_of("")) else ():
-            if request_of(entry.id) == run.request_id:
-                self._leave(entry, run)
+            if run.request_id in entry.entered.requests:
+                if not entry.entered.together:
+                    self._leave(entry, run)
+                entry.became = entry.became or run
                 break
         self._doubts.look_at(run)
         if is_news:
@@ -669,7 +677,7 @@ class Queues:
                 except msgspec.DecodeError:
                     log.exception("%s cannot be read", row.stream)
         for entry in tuple(self._entries):
-            rows = await self._journal.query(queries.by_request(request_of(entry.id)))
+            rows = await self._journal.query(queries.of_start(request_of(entry.id)))
             if rows:
                 self._entries.remove(entry)
                 event = QueueLeft(at=self._clock_us(), run=rows[0].id)
@@ -685,16 +693,3 @@ class Queues:
         names = {name for each in self._entries for name in each.queue_names}
         for queue in [self._queue_of(name) for name in sorted(names)]:
             self._doubts.meet(queue, Doubt("restart", _RESTARTED))
-
-
-def closing_of(closed: QueueClosed) -> str:
-    """Return the name of the closing of a queue, by which a person says which one they saw."""
-    return str(closed.at)
-
-
-def _kept_in(events: list[Event]) -> StartRequest:
-    kept = next((each.body for each in events if each.kind == QueueStartKept.kind), b"")
-    try:
-        return start_of(msgspec.json.decode(kept, type=QueueStartKept).start)
-    except msgspec.DecodeError as damaged:
-        raise Unavailable("The start of this entry cannot be read.") from damaged

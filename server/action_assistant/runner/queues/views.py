@@ -7,9 +7,9 @@ from typing import Any, Literal, TypeAlias
 import msgspec
 
 from action_assistant.runner.links.port import SIMULATOR
-from action_assistant.runner.queues.entry import Wait, Waiting, named, told
+from action_assistant.runner.queues.entry import Wait, Waiting, closing_of, named, told
 from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
-from action_assistant.runner.queues.service import Queues, closing_of
+from action_assistant.runner.queues.service import Queues
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run

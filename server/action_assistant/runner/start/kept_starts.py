@@ -51,12 +51,13 @@ def graph_of(start: StartRequest) -> Graph:
     return reading.graph
 
 
-def group_of(start: StartRequest) -> GroupRequest:
-    """Return the request of a pre-flight of a start."""
+def group_of(start: StartRequest, engines: tuple[str, ...] = ()) -> GroupRequest:
+    """Return the request of a pre-flight of a start, or of one on several robots. `engines`: these, in
+    place of the one that it names."""
     names = {each.name for each in msgspec.structs.fields(GroupRequest)}
     fields = {
         each.name: getattr(start, each.name)
         for each in msgspec.structs.fields(start)
         if each.name in names
     }
-    return GroupRequest(engines=(start.engine,), **fields)
+    return GroupRequest(engines=engines or (start.engine,), **fields)

@@ -1,0 +1,241 @@
+"""A start on several robots waits in the queue of each, and its turn comes when it is the first in all."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import anyio
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.runner.execution.start_pipeline import Grouped
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.queues.entry import (
+    MoveRequest,
+    QueueRequest,
+    TurnRequest,
+    Waiting,
+    request_of,
+    waits_of,
+)
+from action_assistant.runner.queues.robot_queue import Entry
+from action_assistant.runner.queues.service import Queues
+from action_assistant.runner.start.approvals import ApprovalRequest
+from runner.harness import clock_us, order, sequence, until, virtual
+from runner.queues.test_queues import (
+    Lab,
+    direct,
+    on,
+    over,
+    put,
+    queue_of,
+    reopened,
+    why_closed,
+)
+from runner.start.test_rights_registry import ANN, BEN, author
+
+ROBOTS = ("Carol", "David", "Ed", "Flo")
+
+
+def both(name: str = "task", **changes: Any) -> QueueRequest:
+    """A start on both robots of the lab."""
+    start = order(sequence(name), engine="David", **changes)
+    return QueueRequest(start=start, engines=("David", "Carol"))
+
+
+async def begun(queues: Queues, entry: Entry) -> Grouped:
+    """Look at an entry as people do, and start it."""
+    look = await queues.look(entry.id, {}, ANN)
+    started = await queues.start(entry.id, TurnRequest(look.digest), author(ANN), ANN)
+    assert isinstance(started, Grouped)
+    return started
+
+
+@virtual
+async def test_it_waits_for_the_last_of_its_robots_and_a_person_starts_it_on_all() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        run = await direct(control, "Carol")
+        entry = await put(queues, both())
+        behind = await put(queues, on("David"))
+        assert [(each.robot, each.why) for each in entry.waits] == [("Carol", "run")]
+        assert [(each.robot, each.why) for each in behind.waits] == [("David", "behind")]
+        with pytest.raises(Conflict, match="Carol is not free"):
+            await begun(queues, entry)
+        await over(control, run)
+        await anyio.sleep(60)
+        assert (len(lab.david.starts), len(lab.carol.starts)) == (0, 1)  # a person's hand
+        look = await queues.look(entry.id, {}, ANN)
+        assert sorted(each.engine for each in look.looks) == ["Carol", "David"]
+        started = await begun(queues, entry)
+        assert [each.engine for each in started.runs] == ["Carol", "David"]
+        assert (len(lab.david.starts), len(lab.carol.starts)) == (1, 2)
+        again = await queues.start(entry.id, TurnRequest("any"), author(BEN), BEN)
+        assert isinstance(again, Grouped)
+        assert ([each.id for each in again.runs], again.fresh) == (
+            [each.id for each in started.runs],
+            False,
+        )
+        assert queues.entries == (behind,)
+        await until(lambda: not control.open)
+        assert behind.ready_at is not None
+    async with lab.runner() as (_, queues):
+        assert [each.id for each in queues.entries] == [behind.id]
+        with pytest.raises(NotFound):
+            await queues.start("other", TurnRequest("any"), author(BEN), BEN)
+
+
+@virtual
+async def test_any_closed_queue_of_its_robots_keeps_it_back_and_it_keeps_nobody() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        entry, other = await put(queues, both()), await put(queues, on("David"))
+        look = await queues.look(entry.id, {}, ANN)
+        queues.close("Carol", author(BEN))
+        assert [each.why for each in entry.waits] == ["closed"]
+        assert other.ready_at is not None  # that of David is open
+        with pytest.raises(Conflict, match="The queue of Carol is closed"):
+            await queues.start(entry.id, TurnRequest(look.digest), author(ANN), ANN)
+        await reopened(queues, "Carol")
+        with pytest.raises(Conflict, match="Look again"):  # the old look counts no more
+            await queues.start(entry.id, TurnRequest(look.digest), author(ANN), ANN)
+        control.stop_robot("David", author(BEN))
+        assert (why_closed(queues, "David"), why_closed(queues, "Carol")) == ("stop", "")
+        assert entry.ready_at is None
+        assert lab.david.starts == lab.carol.starts == []
+
+
+@virtual
+async def test_a_queue_that_closes_between_its_two_messages_holds_the_second_back() -> None:
+    for at_s in (0.0, 0.5, 1.0, 1.5, 2.5):
+        lab = Lab()
+        async with lab.runner() as (control, queues):
+            entry = await put(queues, both())
+            look = await queues.look(entry.id, {}, ANN)
+            lab.harness.journal.slow = 1.0
+            found: list[Grouped | str] = []
+
+            async def press(
+                queues: Queues = queues,
+                entry: Entry = entry,
+                digest: str = look.digest,
+                found: list[Grouped | str] = found,
+            ) -> None:
+                try:
+                    started = await queues.start(entry.id, TurnRequest(digest), author(ANN), ANN)
+                    assert isinstance(started, Grouped)
+                    found.append(started)
+                except Conflict as refused:
+                    found.append(refused.detail)
+
+            async with anyio.create_task_group() as people:
+                people.start_soon(press)
+                await anyio.sleep(at_s)
+                if "David" in {each.name for each in queues.robot_queues}:
+                    left = len(lab.david.starts)
+                    queues.close("David", author(BEN))  # Carol comes first by name
+                else:
+                    left = 1
+            lab.harness.journal.slow = 0.0
+            assert len(lab.david.starts) == left, (at_s, found)
+            await until(lambda control=control: not control.open)  # type: ignore[misc]
+            requests = [each.request_id for each in lab.starts()]
+            assert len(requests) == len(set(requests))
+
+
+@virtual
+async def test_two_that_want_the_same_robots_in_another_order_do_not_wait_for_each_other() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        one = await put(queues, both("one"))
+        other = await put(
+            queues,
+            QueueRequest(
+                start=order(sequence("other"), engine="Carol"), engines=("Carol", "David")
+            ),
+        )
+        assert (one.ready_at is None, other.ready_at is None) == (False, True)
+        await queues.move(one.id, MoveRequest(), author(ANN), ANN)
+        assert (one.ready_at is None, other.ready_at is None) == (True, False)
+        await begun(queues, other)
+        await until(lambda: not control.open)
+        await begun(queues, one)
+        assert [len(each.starts) for each in (lab.david, lab.carol)] == [2, 2]
+
+
+@virtual
+async def test_it_needs_the_yes_of_a_second_person_where_one_of_its_robots_asks() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        demanding = Registration(name="Carol", profile={"second_person": True})
+        await control.register(demanding, author(ANN))
+        await until(lambda: control.robots.robot("Carol").heard_at is not None)
+        entry = await put(queues, both())
+        with pytest.raises(Conflict, match="nobody else has said yes"):
+            await begun(queues, entry)
+        assert lab.david.starts == lab.carol.starts == []
+        looks = (await queues.look(entry.id, {}, BEN)).looks
+        (digest,) = {each.order_digest for each in looks if each.order_digest}
+        await control.approvals.give(ApprovalRequest(digest=digest), author(BEN))
+        assert len((await begun(queues, entry)).runs) == 2
+
+
+@virtual
+async def test_it_names_robots_only_and_is_put_there_once() -> None:
+    lab = Lab()
+    async with lab.runner() as (_, queues):
+        for engines in (("simulator", "David"), ("Carol",), ("conducted", "David")):
+            wrong = msgspec.structs.replace(both(), engines=engines)
+            with pytest.raises(BadInput, match="names robots only"):
+                await queues.put(wrong, author(ANN), ANN)
+        request = both()
+        entry = await put(queues, request)
+        assert await queues.put(request, author(ANN), ANN) == (entry, False)
+        alone = msgspec.structs.replace(request, engines=())
+        with pytest.raises(Conflict, match="another entry"):
+            await queues.put(alone, author(ANN), ANN)
+        assert queue_of(queues, "Carol").robots == ("Carol",)
+        assert entry.entered.requests == (
+            f"{request_of(entry.id)}/Carol",
+            f"{request_of(entry.id)}/David",
+        )
+        assert entry.entered.at <= clock_us()
+
+
+def told(
+    entries: Sequence[tuple[str, ...]], closed: set[str], busy: set[str]
+) -> list[tuple[Waiting, ...]]:
+    why = {name: ([Waiting(name, "run")] if name in busy else []) for name in ROBOTS}
+    return list(waits_of(entries, closed, why))
+
+
+ENTRIES = st.lists(
+    st.lists(st.sampled_from(ROBOTS), min_size=1, max_size=4, unique=True).map(tuple), max_size=8
+)
+SOME = st.sets(st.sampled_from(ROBOTS))
+
+
+@given(ENTRIES, SOME, SOME, st.randoms(use_true_random=False))
+def test_however_they_are_moved_somebody_has_a_turn_and_no_robot_two_at_once(
+    entries: list[tuple[str, ...]], closed: set[str], busy: set[str], chance: Any
+) -> None:
+    chance.shuffle(entries)  # moves: any order, which is the same for all robots
+    waits = told(entries, closed, busy)
+    turns = [names for names, why in zip(entries, waits, strict=True) if not why]
+    robots = [name for names in turns for name in names]
+    assert len(robots) == len(set(robots))
+    assert set(robots).isdisjoint(closed | busy)
+    free = [names for names in entries if set(names).isdisjoint(closed)]
+    for names in turns:
+        earlier = free[: free.index(names)]
+        assert all(set(names).isdisjoint(each) for each in earlier)
+    if free and not busy:
+        assert free[0] in turns  # no circle of those that wait for each other
+    left = [names for names in free if not set(names) & busy]
+    while left and not busy:  # each start is over some time: all come to their turn
+        waits = told(left, closed, set())
+        before = len(left)
+        left = [names for names, why in zip(left, waits, strict=True) if why]
+        assert len(left) < before
