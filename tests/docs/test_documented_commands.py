@@ -68,6 +68,7 @@ LISTED: Final = {
     "action-assistant runs go-on": "needs a led run that is held: tests/ros leads some",
     "action-assistant audit verify": "needs that the server has ended, as `verify`, which is tried",
     "action-assistant incident": "needs the id of a run: tests/test_incident.py keeps some",
+    "action-assistant rights": "needs persons, a group and a folder: tests/commands has some",
     "action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
     ".venv-ros/bin/action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
 }

@@ -200,13 +200,15 @@ export interface EditorApi {
      * Behaviour
      * @description The behaviour of one call of an action. Times are seconds.
      *
-     *     `after_s`: how long it runs. `never`: it does not end by itself. `ignores_stop`: it continues
-     *     until its own end. `stop_error`: it throws in onStop; the engine shows ERROR at once, whatever
-     *     its code does. `pauses`: it has an onPause. `load_s`: how long it loads (library and `onInit`)
-     *     when it is triggered for the first time, which the engine does not count as running.
-     *     `init_error`: it throws when it is loaded. `no_library`: it is indexed and its library is
-     *     missing, so that no graph with it can be built (read from its first call). `outputs`: values by
-     *     flat name.
+     *     `after_s`: how long it runs. `result`: how it ends. `stop_s`: how long a stop takes. `never`: it
+     *     does not end by itself. `ignores_stop`: it continues until its own end; 5 s after a stop the engine
+     *     calls it ERROR. `stop_error`: it throws in onStop; the engine shows ERROR at once, whatever its code
+     *     does. `pauses`: it has an onPause. `load_s`: how long it loads (library and `onInit`) when it is
+     *     triggered for the first time, which the engine does not count as running. `init_error`: it throws
+     *     when it is loaded. `no_library`: it is indexed and its library is missing, so that no graph with it
+     *     can be built (read from its first call). `outputs`: values by flat name; others get the value of the
+     *     file, else their first allowed value, else the neutral one of their type. `message`: a line of its
+     *     log.
      */
     Behaviour: {
         /** @default 1 */
