@@ -13,6 +13,9 @@ export const NO_ROS = existsSync(PYTHON) ? "" : "rclpy is not there: make ros bu
 /** A domain for this process alone, away from those that people use. */
 export const DOMAIN = 120 + (process.pid % 80);
 
+/** The domain of a second hall: a runner would see that of the first one as somebody else. */
+export const SECOND_DOMAIN = 200 + (process.pid % 30);
+
 /** A process that speaks ROS 2. */
 class Speaker {
   #process: ChildProcess | undefined;
@@ -87,11 +90,13 @@ abstract class Engine extends Speaker {
  * `NAME=VALUE`. Its snapshots all arrive: a lost one may leave a Stop unconfirmed, by chance. */
 export class StandIn extends Engine {
   private readonly actions: string;
+  private readonly domain: number;
 
   /** `actions`: a folder with the files of those that it has; without one it has all. */
-  constructor(name: string, actions = "") {
+  constructor(name: string, actions = "", domain = DOMAIN) {
     super(name);
     this.actions = actions;
+    this.domain = domain;
   }
 
   start(folder: string, behaviours: Record<string, object | object[]>, ...quirks: string[]): void {
@@ -100,7 +105,7 @@ export class StandIn extends Engine {
     writeFileSync(script, JSON.stringify({ behaviours: Object.fromEntries(each) }));
     this.begin([
       ...["-m", "action_assistant", "simulate-robot", this.name],
-      ...["--domain", String(DOMAIN), "--namespace", this.name, "--script", script],
+      ...["--domain", String(this.domain), "--namespace", this.name, "--script", script],
       ...["loss=0", ...quirks].flatMap((quirk) => ["--quirk", quirk]),
       ...(this.actions === "" ? [] : ["--actions", this.actions]),
     ]);

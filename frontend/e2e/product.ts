@@ -24,6 +24,7 @@ export class Product {
   private readonly hosts: string;
   private readonly settings: Readonly<Record<string, string>>;
   private process: ChildProcess | undefined;
+  private more: (port: number) => readonly string[] = () => [];
   private readonly contexts: BrowserContext[] = [];
 
   /** `hosts` are names that lead here, for others on the network; `settings`: more of its environment. */
@@ -49,8 +50,9 @@ export class Product {
     return `${this.scheme}://127.0.0.1:${this.port + 1}`;
   }
 
-  /** Starts both processes and waits until they answer. */
-  async start(): Promise<void> {
+  /** Starts both processes and waits until they answer. `more`: flags that name the port of the editor. */
+  async start(more: (port: number) => readonly string[] = () => []): Promise<void> {
+    this.more = more;
     const known = this.port !== 0;
     for (let tries = 0; ; tries += 1) {
       if (!known) this.port = await freePorts();
@@ -70,7 +72,16 @@ export class Product {
     const log = openSync(this.log, "a");
     this.process = spawn(
       COMMAND,
-      ["serve", "--data", this.data, "--port", String(this.port), "--no-open", ...this.flags],
+      [
+        "serve",
+        "--data",
+        this.data,
+        "--port",
+        String(this.port),
+        "--no-open",
+        ...this.flags,
+        ...this.more(this.port),
+      ],
       {
         detached: true,
         stdio: ["ignore", log, log],
@@ -222,7 +233,7 @@ export function pause(milliseconds: number): Promise<void> {
   return new Promise((done) => setTimeout(done, milliseconds));
 }
 
-async function answers(url: string): Promise<boolean> {
+export async function answers(url: string): Promise<boolean> {
   try {
     return (await fetch(url)).ok;
   } catch {

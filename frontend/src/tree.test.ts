@@ -87,7 +87,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "home",
   ]),
   account: ["clock", "words", "ui", "api"],
-  administration: ["clock", "words", "ui", "api"],
+  administration: ["clock", "words", "ui", "api", "status"],
   programs: ["words", "ui", "api"],
   view: ["clock", "words", "graph", "ui", "api", "status", "canvas"],
   app: [

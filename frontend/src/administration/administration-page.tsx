@@ -2,17 +2,35 @@
 import { IconServerCog } from "@tabler/icons-react";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
+import type { Site } from "../api/sites";
 import { serverNow } from "../clock/server-clock";
 import { Empty } from "../ui/empty";
 import { ago, instant } from "../ui/times";
+import { isolated } from "../words/isolated";
 import style from "./administration.module.css";
 import { Findings } from "./findings";
 import { MessagesCard } from "./messages";
 import { Facts, ProcessCard, type StatusFact } from "./process-card";
 import { type Backups, bytes, type ProcessStatus, span, useStatus } from "./status";
 
+const runnerTitle = (site: string | undefined) => (site ? `Runner of ${isolated(site)}` : "Runner");
+
+function FurtherRunner({ site }: { site: Site }) {
+  const asked = useStatus("runner", site.url);
+  return (
+    <>
+      <FaultsCard processes={[asked.data]} />
+      <div className={style.processes}>
+        <ProcessCard title={runnerTitle(site.name)} asked={asked} />
+      </div>
+      {asked.data && <RobotLinks status={asked.data} />}
+    </>
+  );
+}
+
 function Inside() {
-  const { runner } = useLive();
+  const { runner, now } = useLive();
+  const [first, ...others] = now.sites ?? [];
   const ofEditor = useStatus("editor", "");
   const ofRunner = useStatus("runner", runner);
   return (
@@ -20,9 +38,12 @@ function Inside() {
       <FaultsCard processes={[ofEditor.data, ofRunner.data]} />
       <div className={style.processes}>
         <ProcessCard title="Editor" asked={ofEditor} />
-        <ProcessCard title="Runner" asked={ofRunner} />
+        <ProcessCard title={runnerTitle(first?.site.name)} asked={ofRunner} />
       </div>
       {ofRunner.data && <RobotLinks status={ofRunner.data} />}
+      {others.map(({ site }) => (
+        <FurtherRunner key={site.url} site={site} />
+      ))}
       {ofEditor.data && (
         <BackupsCard backups={ofEditor.data.backups ?? null} at={ofEditor.data.at} />
       )}

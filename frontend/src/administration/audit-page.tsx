@@ -8,6 +8,7 @@ import { Link, useLocation, useSearch } from "wouter";
 import { useGraphNames } from "../api/graph-list";
 import { useLive } from "../api/page-link";
 import { currentName, useKnownPeople, useMay, usePerson } from "../api/people";
+import { useSiteChoice } from "../status/site-choice";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -49,7 +50,7 @@ export function AuditPage() {
 function Inside() {
   const [, go] = useLocation();
   const filter = auditFilterOf(new URLSearchParams(useSearch()));
-  const { runner } = useLive();
+  const { runner, choice } = useSiteChoice();
   const logs = {
     editor: useAuditLog("editor", undefined, filter),
     runner: useAuditLog("runner", runner, filter),
@@ -77,6 +78,7 @@ function Inside() {
         filter={filter}
         onChange={(next) => go(`/audit?${auditQueryOf(next)}`, { replace: true })}
       />
+      {choice}
       <Download filter={filter} runner={runner} />
       <Away log="editor" problem={logs.editor.log.problem} />
       <Away log="runner" problem={logs.runner.log.problem} />

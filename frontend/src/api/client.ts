@@ -2,6 +2,7 @@
 import { fetchAnswer, type RequestOptions } from "./http";
 import type { EditorPaths } from "./schema/editor";
 import type { RunnerPaths } from "./schema/runner";
+import { routerOf } from "./sites";
 
 type Method = "get" | "post" | "put" | "patch" | "delete";
 
@@ -79,24 +80,37 @@ function urlOf(route: string, { path = {}, query = {} }: Request): string {
   return text === "" ? url : `${url}?${text}`;
 }
 
-function clientOf<Paths>(origin: string): Client<Paths> {
-  const send = (method: NonNullable<RequestOptions["method"]>) => {
-    return async (route: string, request: Request): Promise<unknown> => {
-      const { path, query, status, onHeaders, ...options } = request;
-      const response = await fetchAnswer(origin + urlOf(route, request), { method, ...options });
-      if (status !== undefined && response.status !== status) {
-        throw new Error(`The server answered ${response.status} instead of ${status}.`);
-      }
-      onHeaders?.(response.headers);
-      return response.status === 204 ? undefined : response.json();
-    };
+async function send(
+  origin: string,
+  method: Method,
+  route: string,
+  request: Request,
+): Promise<unknown> {
+  const { path, query, status, onHeaders, ...options } = request;
+  const verb = method.toUpperCase() as Uppercase<Method>;
+  const response = await fetchAnswer(origin + urlOf(route, request), { method: verb, ...options });
+  if (status !== undefined && response.status !== status) {
+    throw new Error(`The server answered ${response.status} instead of ${status}.`);
+  }
+  onHeaders?.(response.headers);
+  return response.status === 204 ? undefined : response.json();
+}
+
+/** `isOne`: also an address that stands for all sites is that of one runner. */
+function clientOf<Paths>(origin: string, isOne = false): Client<Paths> {
+  const bound = (method: Method) => (route: string, request: Request) => {
+    const router = isOne ? undefined : routerOf(origin);
+    if (router === undefined) return send(origin, method, route, request);
+    return router.ask(`${method} ${route}`, request, (site, other) =>
+      send(site.url, method, route, { ...request, ...other }),
+    );
   };
   const client: Record<Method, (route: string, request: Request) => Promise<unknown>> = {
-    get: send("GET"),
-    post: send("POST"),
-    put: send("PUT"),
-    patch: send("PATCH"),
-    delete: send("DELETE"),
+    get: bound("get"),
+    post: bound("post"),
+    put: bound("put"),
+    patch: bound("patch"),
+    delete: bound("delete"),
   };
   return client as Client<Paths>;
 }
@@ -106,6 +120,11 @@ export const editor = clientOf<EditorPaths>("");
 /** The client of the runner at this address; the page does not know it at first, and does not ask. */
 export function runnerAt(address: string | undefined): Client<RunnerPaths> {
   return clientOf(address ?? "");
+}
+
+/** The client of one runner, also where its address is the one that stands for all sites. */
+export function runnerOnlyAt(address: string): Client<RunnerPaths> {
+  return clientOf(address, true);
 }
 
 /**

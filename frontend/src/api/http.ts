@@ -1,7 +1,9 @@
 /** Requests to editor and runner, and how they refuse. */
 import { hearAnswer, tick } from "../clock/server-clock";
+import { isolated } from "../words/isolated";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
+import { isFurtherSite, siteOfUrl } from "./sites";
 
 /** RFC 9457 as both processes answer it. */
 export type ProblemDetails = EditorApi["ProblemDetails"];
@@ -22,6 +24,11 @@ class Unreachable extends Error {
     super(`${who} does not answer.`);
     this.name = "Unreachable";
   }
+}
+
+/** Return the runner of a site in words; "The runner" where there is only one. */
+export function runnerWords(site: string | undefined): string {
+  return site === undefined ? "The runner" : `The runner of ${isolated(site)}`;
 }
 
 /** Return whether the outcome of a failed request is unknown: no server refused it. */
@@ -142,11 +149,14 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
     const asked = tick();
     const response = await fetch(isEditor ? serverPath(url) : url, init);
     if (isEditor) hearAnswer(response.headers.get("date"), asked); // others hide it from this page
-    if (response.status === 401 && ask.viewKey === undefined) void heard401(isEditor);
+    if (response.status === 401 && ask.viewKey === undefined) {
+      if (!isFurtherSite(url)) void heard401(isEditor);
+      else void isSignedIn(); // a site that does not know the session ends it nowhere else
+    }
     return response;
   } catch (error) {
     if (ask.signal?.aborted) throw error;
-    throw new Unreachable(isEditor ? "The editor" : "The runner");
+    throw new Unreachable(isEditor ? "The editor" : runnerWords(siteOfUrl(url)?.name));
   }
 }
 

@@ -1,14 +1,16 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { hearStamp, tick } from "../clock/server-clock";
 import { isEqual, newAid } from "../graph/stop-basics";
+import { runnerOnlyAt } from "./client";
 import type { AskedConfirmation } from "./confirmations";
 import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
 import { isPieceOf } from "./led-runs";
 import { pageUrl } from "./page-url";
 import type { HeldGraph, Robot } from "./robots";
-import { getRun, postStop } from "./run-stop";
+import { postStop } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
+import type { Site } from "./sites";
 
 export type LiveLink = "connecting" | "live" | "down";
 
@@ -48,6 +50,13 @@ export interface LiveState {
   asked: readonly AskedConfirmation[];
   /** The last message about the queue; nothing waits without one. */
   queue?: RunnerApi["QueueMessage"] | undefined;
+  /** The state of each site, where the page has several runners: all else here is joined out of them. */
+  sites?: readonly SiteState[];
+}
+
+export interface SiteState {
+  readonly site: Site;
+  readonly state: LiveState;
 }
 
 type RunnerMessage = RunnerApi["RunnerMessage"];
@@ -137,11 +146,11 @@ export class LiveSocket {
    * Sends Stop over the socket and by POST at once: whichever arrives first counts. While nobody
    * hears it, it is sent again for as long as the page is open.
    */
-  stop(run: string | "all"): void {
+  stop(run: string | "all", id: string = newAid()): void {
     const open = [...this.state.runs.values()].filter((each) => each.ended_at === null);
     const runs = run === "all" ? open.map((each) => each.id) : [];
     const stop: StopRequest = {
-      id: newAid(),
+      id,
       run,
       at: tick(),
       runs,
@@ -282,10 +291,12 @@ export class LiveSocket {
         for (const [id, run] of runs) {
           if (open.has(id) || run.ended_at !== null) continue;
           runs.delete(id);
-          getRun(this.#runner, id).then(
-            (ended) => this.#putRun(ended),
-            (error: Error) => console.warn("A run's end is not known", id, error.message),
-          );
+          runnerOnlyAt(this.#runner)
+            .get("/api/runs/{run}", { path: { run: id } })
+            .then(
+              (ended) => this.#putRun(ended),
+              (error: Error) => console.warn("A run's end is not known", id, error.message),
+            );
         }
         for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
         this.#joinStops(message.runs);
@@ -449,18 +460,38 @@ export function isUrgentChange(before: Run | undefined, now: Run): boolean {
   return URGENT.some((field) => !isEqual(before[field], now[field]));
 }
 
+/** Return which of two runs is newer, for `sort`. Each runner counts its own. */
+function byAge(now: LiveState): (a: Run, b: Run) => number {
+  if (now.sites === undefined) return (a, b) => b.number - a.number;
+  return (a, b) => Date.parse(b.requested_at) - Date.parse(a.requested_at);
+}
+
 /** The runs that go on, newest first, as far as this page knows. */
 export function openRuns(now: LiveState): Run[] {
-  return [...now.runs.values()]
-    .filter((run) => run.ended_at === null)
-    .sort((a, b) => b.number - a.number);
+  return [...now.runs.values()].filter((run) => run.ended_at === null).sort(byAge(now));
+}
+
+/** Return the site that has a run, as far as the page has heard of the run live. */
+export function siteWith(now: LiveState, run: string): SiteState | undefined {
+  return now.sites?.find(({ state }) => state.runs.has(run));
+}
+
+/** Return the state of the site that has a run; `now` with one runner. */
+export function stateOf(now: LiveState, run: string | undefined): LiveState {
+  return (run === undefined ? undefined : siteWith(now, run)?.state) ?? now;
+}
+
+/** Return the sites of which nothing is known now. */
+export function silentSites(now: LiveState): SiteState[] {
+  return (now.sites ?? []).filter(({ state }) => state.link !== "live");
 }
 
 /** The newest run of a graph that this page has heard of live. */
 export function newestRun(now: LiveState, graph: string): Run | null {
   let newest: Run | null = null;
+  const order = byAge(now);
   for (const run of now.runs.values()) {
-    if (run.graph === graph && (newest === null || run.number > newest.number)) newest = run;
+    if (run.graph === graph && (newest === null || order(run, newest) < 0)) newest = run;
   }
   return newest;
 }

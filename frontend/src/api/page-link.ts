@@ -7,10 +7,11 @@ import { useMemo, useSyncExternalStore } from "react";
 import { tick } from "../clock/server-clock";
 import { editor } from "./client";
 import { errorText } from "./http";
-import { LiveSocket, type LiveState } from "./live-socket";
+import type { Live } from "./live-sites";
+import { LiveSocket, type LiveState, stateOf } from "./live-socket";
 
 export interface PageLinkState {
-  live: LiveSocket | null;
+  live: Live | null;
   /** The runner's address, once the editor has told it. */
   runner: string | undefined;
   /**
@@ -31,6 +32,7 @@ class PageLink {
   #who = "";
   #visit = 0;
   #asking = false;
+  #makeLive: (runner: string) => Live = (runner) => new LiveSocket(runner);
 
   now = (): PageLinkState => this.#state;
 
@@ -62,7 +64,7 @@ class PageLink {
   }
 
   #open(runner: string): void {
-    const live = new LiveSocket(runner);
+    const live = this.#makeLive(runner);
     live.open();
     this.#set({ live, runner, lost: "" });
   }
@@ -73,7 +75,11 @@ class PageLink {
     this.#asking = true;
     for (let wait = 500; this.#state.signedIn; wait = Math.min(AGAIN, 2 * wait)) {
       try {
-        const { runner_url } = await editor.get("/api/config", {});
+        const { runner_url, runners = [] } = await editor.get("/api/config", {});
+        if (runners.length > 1) {
+          const { LiveSites } = await import("./live-sites");
+          this.#makeLive = () => new LiveSites(runners);
+        }
         if (this.#state.signedIn) this.#open(runner_url);
         else this.#set({ runner: runner_url });
         break;
@@ -113,12 +119,13 @@ const unknown = (lost: string): LiveState =>
         unreached: { kind: "silent", why: `The runner’s address is not known. ${lost}` },
       };
 
-export function useLive(): PageLinkState & { now: LiveState } {
+/** `run`: the run about which it is asked, where the state of its site is meant and not that of all. */
+export function useLive(run?: string): PageLinkState & { now: LiveState } {
   const hold = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   const { live, lost } = hold;
   const nothing = useMemo(() => unknown(lost), [lost]);
   const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.state ?? nothing);
-  return { ...hold, now };
+  return { ...hold, now: stateOf(now, run) };
 }
 
 /**

@@ -5,6 +5,7 @@ import { sendPress } from "./presses";
 import type { Run } from "./run-stop";
 import type { Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
+import { runnerOfRun } from "./sites";
 
 export type Question = RunnerApi["QuestionShown"];
 
@@ -60,5 +61,5 @@ export async function sendPhoto(
 
 /** The address of a photo that a person gave as an answer. */
 export function photoUrl(runner: string, run: string, photo: string): string {
-  return `${runner}/api/runs/${encodeURIComponent(run)}/photos/${encodeURIComponent(photo)}`;
+  return `${runnerOfRun(runner, run)}/api/runs/${encodeURIComponent(run)}/photos/${encodeURIComponent(photo)}`;
 }

@@ -4,6 +4,7 @@ import { serverNow } from "../clock/server-clock";
 import { runnerAt } from "./client";
 import { type Run, type StartOrder, startBody, type Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
+import { runnerOfRun } from "./sites";
 
 export type Repeat = RunnerApi["RepeatShown"];
 export type RepeatSummary = RunnerApi["RepeatSummary"];
@@ -109,5 +110,5 @@ export function reopenRepeat(
 
 /** Return the address of the table as a file. */
 export function tableUrl(runner: string, repeat: string, format: "csv" | "parquet"): string {
-  return `${runner}/api/repeats/${encodeURIComponent(repeat)}/table?format=${format}`;
+  return `${runnerOfRun(runner, repeat)}/api/repeats/${encodeURIComponent(repeat)}/table?format=${format}`;
 }

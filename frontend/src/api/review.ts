@@ -5,6 +5,7 @@ import { fetchAnswer, type RequestOptions } from "./http";
 import { getRun } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
+import { runnerOfRun } from "./sites";
 
 export type RunMarks = RunnerApi["RunMarks"];
 /** A run of the list, with what people noted about it and why it did not end well. */
@@ -142,7 +143,7 @@ export function useComparison(runner: string | undefined, a: string, b: string) 
 
 export function useStatistics(runner: string | undefined, graph: string) {
   return useQuery({
-    queryKey: ["runs", "statistics", graph],
+    queryKey: ["runs", "statistics", runner, graph],
     queryFn: ({ signal }) => runnerAt(runner).get("/api/statistics", { query: { graph }, signal }),
     enabled: runner !== undefined && graph !== "",
   });
@@ -202,7 +203,7 @@ export function useRaw(runner: string | undefined, run: Run) {
 
 /** Return the address from which a run can be downloaded as a file. */
 export function exportUrl(runner: string, run: string, format: "jsonl" | "csv" | "mcap"): string {
-  return `${runner}${path(run)}/export?format=${format}`;
+  return `${runnerOfRun(runner, run)}${path(run)}/export?format=${format}`;
 }
 
 /** The first `most` lines of what a route answers, and whether there are more. */
@@ -237,7 +238,7 @@ export function useRawEvents(runner: string | undefined, run: Run, most: number)
 
 /** Return the address of the graph of a run, as it was sent. */
 export function umrfUrl(runner: string, run: string): string {
-  return `${runner}${path(run)}/umrf`;
+  return `${runnerOfRun(runner, run)}${path(run)}/umrf`;
 }
 
 /** Changes of an action. From the visit number `first` on, its visits are now `visits`. */

@@ -1,8 +1,9 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
 import { useQueries, useQuery } from "@tanstack/react-query";
-import { runnerAt } from "./client";
+import { runnerAt, runnerOnlyAt } from "./client";
 import { fetchText } from "./http";
 import type { RunnerApi } from "./schema/runner";
+import { runnerOfRobot, takenElsewhere } from "./sites";
 
 export const SIMULATOR = "simulator";
 
@@ -27,12 +28,13 @@ export type PreflightItem = RunnerApi["Item"];
  * that cannot be overridden. */
 export type Preflight = RunnerApi["Preflight"];
 
-const path = (runner: string, name: string) => `${runner}/api/robots/${encodeURIComponent(name)}`;
+const path = (runner: string, name: string) =>
+  `${runnerOfRobot(runner, name)}/api/robots/${encodeURIComponent(name)}`;
 
 /** Query whether the runner can reach robots over ROS 2, and the reason if not. */
 export function useRosReach(runner: string | undefined) {
   return useQuery({
-    queryKey: ["robots", "reach"],
+    queryKey: ["robots", "reach", runner],
     queryFn: ({ signal }) => runnerAt(runner).get("/api/reach", { signal }),
     enabled: runner !== undefined,
   });
@@ -93,8 +95,11 @@ export function useRobotLog(runner: string | undefined, robot: string, on: boole
   });
 }
 
-export function registerRobot(runner: string, robot: Registration): Promise<Robot> {
-  return runnerAt(runner).post("/api/robots", { body: robot });
+/** `runner`: of the site that is to lead it. Throws if another site has a robot of this name, or may have one. */
+export async function registerRobot(runner: string, robot: Registration): Promise<Robot> {
+  const taken = takenElsewhere(robot.name, runner);
+  if (taken !== "") throw new Error(taken);
+  return runnerOnlyAt(runner).post("/api/robots", { body: robot });
 }
 
 export function changeRobot(runner: string, robot: Registration): Promise<Robot> {

@@ -2,6 +2,7 @@
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { editor, renewing, runnerAt } from "./client";
 import type { EditorApi } from "./schema/editor";
+import { runnerOfRun } from "./sites";
 
 export type ViewLink = EditorApi["ViewLink"];
 
@@ -15,8 +16,8 @@ const KEY = "view-links";
 const LOOK = 4_000; // ms: who opens a link is counted soon
 
 /** Return the client of the process that has the links of a thing: both have the same routes. */
-const processOf = ({ kind }: ViewedThing, runner: string | undefined) =>
-  runnerAt(kind === "graph" ? "" : runner);
+const processOf = ({ kind, id }: ViewedThing, runner: string | undefined) =>
+  runnerAt(kind === "graph" || runner === undefined ? "" : runnerOfRun(runner, id));
 
 export function useViewLinks(runner: string | undefined, thing: ViewedThing) {
   return useQuery({

@@ -6,6 +6,7 @@ import { editor } from "../api/client";
 import { errorText, fetchAnswer } from "../api/http";
 import type { Run } from "../api/runs";
 import type { EditorApi } from "../api/schema/editor";
+import { runnerOfRun } from "../api/sites";
 import { serverNow } from "../clock/server-clock";
 import { instant } from "../ui/times";
 
@@ -56,7 +57,7 @@ const PAGES = 10; // of the editor's audit
 /** Keep a run, and return its file. The runner has no access to the editor's audit: it goes along, and
  * the editor is told to keep it. */
 async function keepIncident(runner: string, run: Run, reason: string): Promise<Blob> {
-  const url = `${runner}/api/runs/${encodeURIComponent(run.id)}/incident`;
+  const url = `${runnerOfRun(runner, run.id)}/api/runs/${encodeURIComponent(run.id)}/incident`;
   const body = { reason, editor_audit: await editorAudit(run) };
   const answer = await fetchAnswer(url, { method: "POST", body, timeoutMs: 120_000 });
   return answer.blob();

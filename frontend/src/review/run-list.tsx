@@ -7,6 +7,7 @@ import { useCurrentName } from "../api/people";
 import type { ListedRun } from "../api/review";
 import { hasEnded } from "../api/run-stop";
 import { type Run, runPlace } from "../api/runs";
+import { siteOfId } from "../api/sites";
 import { boundsText } from "../status/durations";
 import { fromWords } from "../status/earlier-list";
 import { useRunStatus } from "../status/progress";
@@ -112,6 +113,11 @@ function RowLinks({ run, before }: { run: ListedRun; before: RunOfList | null | 
   );
 }
 
+const siteName = (run: string) => {
+  const site = siteOfId(run);
+  return site ? ` · ${isolated(site.name)}` : "";
+};
+
 interface RunRowProps {
   run: RunOfList;
   now: number;
@@ -171,7 +177,10 @@ function Row({ run, now, chosen, onChoose, before }: RunRowProps) {
         {!run.hidden && run.cause && <span className={style.cause}>{run.cause}</span>}
       </td>
       <td className={style.course}>{!run.hidden && <CourseBar run={run} now={now} />}</td>
-      <td className={style.fact}>{runPlace(run)}</td>
+      <td className={style.fact}>
+        {runPlace(run)}
+        {siteName(run.id)}
+      </td>
       <td className={style.fact}>{by}</td>
       <td className={style.fact}>{start !== null && clock(start)}</td>
       <td className={style.took}>{took}</td>

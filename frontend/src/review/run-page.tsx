@@ -349,7 +349,7 @@ function canvasLabel({ graph_name }: Run, { levels }: LevelCursor, version: stri
 }
 
 function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
-  const { now: live, runner } = useLive();
+  const { now: live, runner } = useLive(newest.id);
   const search = useSearch();
   const level = useLevel(newest, search);
   const goes = newest.ended_at === null;

@@ -12,8 +12,9 @@ import {
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { errorText } from "../api/http";
+import { errorText, runnerWords } from "../api/http";
 import { CONDUCTED, enginesOf } from "../api/led-runs";
+import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import {
   filterOf,
@@ -24,6 +25,7 @@ import {
   type RunFilter,
 } from "../api/review";
 import type { Run } from "../api/runs";
+import { type Site, siteOfId } from "../api/sites";
 import { Empty } from "../ui/empty";
 import { QueueLink } from "./queue-page";
 import { RunFilters } from "./run-filters";
@@ -43,13 +45,12 @@ function overlaid(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>):
 }
 
 /** Runs that began after the list was asked for. They wait behind a pill: nothing moves by itself. */
-function newcomers(
-  stored: readonly ListedRun[],
-  live: ReadonlyMap<string, Run>,
-  newest: number,
-): number {
+function newcomers(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>): number {
   const known = new Set(stored.map((run) => run.id));
-  return [...live.values()].filter((run) => run.number > newest && !known.has(run.id)).length;
+  const newest = new Map<Site | undefined, number>(); // each runner counts its own
+  for (const { id, number } of [...stored].reverse()) newest.set(siteOfId(id), number);
+  const isNew = (run: Run) => run.number > (newest.get(siteOfId(run.id)) ?? 0);
+  return [...live.values()].filter((run) => isNew(run) && !known.has(run.id)).length;
 }
 
 /** Pages of the list. They are asked for anew only when somebody wants to. */
@@ -151,13 +152,12 @@ export function RunsPage() {
   const [chosen, setChosen] = useState<readonly string[]>([]);
   const stored = useMemo(() => listed.data?.pages.flat() ?? [], [listed.data]);
   const runs = useMemo(() => overlaid(stored, now.runs), [stored, now.runs]);
-  const newest = stored[0]?.number ?? 0;
-  const waiting = listed.isSuccess ? newcomers(stored, now.runs, newest) : 0;
+  const waiting = listed.isSuccess ? newcomers(stored, now.runs) : 0;
   const filtered = queryOf(filter).size > 0;
   const engines = useMemo(() => engineChoices(stored, filter.robot), [stored, filter.robot]);
   const choose = (run: string, on: boolean) =>
     setChosen(on ? [...chosen.slice(-1), run] : chosen.filter((each) => each !== run));
-  const [b = "", a = ""] = [...chosen].sort((x, y) => numberOf(runs, y) - numberOf(runs, x));
+  const [b = "", a = ""] = [...chosen].sort((x, y) => placeOf(runs, x) - placeOf(runs, y));
   return (
     <main className="page">
       <div className={style.inner}>
@@ -199,6 +199,11 @@ export function RunsPage() {
             </Button>
           )}
         </div>
+        {silentSites(now).map(({ site }) => (
+          <p key={site.url} className="m-0 quiet-12" role="status">
+            {runnerWords(site.name)} does not answer: some of its runs are missing here.
+          </p>
+        ))}
         {listed.isPending && <Waiting />}
         {runs.length === 0 && (
           <NoRuns
@@ -249,6 +254,7 @@ function engineChoices(runs: readonly ListedRun[], chosen: string): string[] {
   ].filter(Boolean);
 }
 
-function numberOf(runs: readonly ListedRun[], id: string): number {
-  return runs.find((run) => run.id === id)?.number ?? 0;
+/** The newest stands first. */
+function placeOf(runs: readonly ListedRun[], id: string): number {
+  return runs.findIndex((run) => run.id === id);
 }

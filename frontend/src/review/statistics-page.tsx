@@ -4,12 +4,12 @@ import { IconAlertTriangle, IconChartBar } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link, useSearch } from "wouter";
 import { errorText } from "../api/http";
-import { useLive } from "../api/page-link";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { INTO } from "../status/level-places";
 import { runLabel } from "../status/progress";
+import { useSiteChoice } from "../status/site-choice";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { counted } from "../words/counted";
@@ -280,12 +280,13 @@ function Found({ found }: { found: Statistics }) {
 
 export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
   const graph = new URLSearchParams(useSearch()).get("graph") ?? "";
-  const { runner } = useLive();
+  const { runner, choice } = useSiteChoice();
   const found = useStatistics(runner, graph);
   return (
     <>
       {bar({ crumbs: [{ label: "Runs", to: "/runs" }, { label: "Statistics" }] })}
       <main className="page">
+        {choice && <div className={style.inner}>{choice}</div>}
         {found.isLoading && (
           <div className={style.inner} aria-busy="true">
             <Skeleton height={110} mb={12} />

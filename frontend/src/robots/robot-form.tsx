@@ -16,6 +16,7 @@ import { useState } from "react";
 import { errorText, Refusal } from "../api/http";
 import { useLive } from "../api/page-link";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
+import { useSiteChoice } from "../status/site-choice";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
 
@@ -112,7 +113,8 @@ export interface EditedRobot {
 }
 
 export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose: () => void }) {
-  const { runner } = useLive();
+  const { runner: anywhere } = useLive();
+  const { runner, choice } = useSiteChoice();
   const client = useQueryClient();
   const [robot, setRobot] = useState(editing.robot);
   usePendingText(robot === editing.robot ? "" : JSON.stringify(robot), null);
@@ -124,7 +126,8 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
   const save = async () => {
     setBusy(true);
     try {
-      await (editing.isNew ? registerRobot : changeRobot)(runner ?? "", robot);
+      if (editing.isNew) await registerRobot(runner ?? "", robot);
+      else await changeRobot(anywhere ?? "", robot);
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
     } catch (problem) {
@@ -153,6 +156,7 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
             data-autofocus
             onChange={(event) => setRobot({ ...robot, name: event.currentTarget.value.trim() })}
           />
+          {editing.isNew && choice}
           <NumberInput
             label="ROS domain"
             description="ROS_DOMAIN_ID of the engine; 0 unless somebody set it."

@@ -71,7 +71,7 @@ function StartedBy({ run }: { run: Run }) {
 
 /** A led run that carries this robot: it may begin further actions here as long as it goes on. */
 function LedRun({ run, robot }: { run: Run; robot: string }) {
-  const { live, now } = useLive();
+  const { live, now } = useLive(run.id);
   const rest = restLines(run, now.link === "down").find((each) => each.robot === robot);
   const further =
     run.desired === "stopped"

@@ -1,8 +1,10 @@
 /** Robots: how their engines are, what runs there, who else is at it, and how to add one. */
 import { Button, Code, Skeleton } from "@mantine/core";
 import { IconPlus, IconRadar2, IconRobot } from "@tabler/icons-react";
-import { useState } from "react";
+import { Fragment, useState } from "react";
 import { Link } from "wouter";
+import { runnerWords } from "../api/http";
+import type { SiteState } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import { type FoundEngine, type Registration, useFoundEngines, useRosReach } from "../api/robots";
@@ -49,6 +51,21 @@ function NoReach({ why }: { why: string }) {
   );
 }
 
+function SiteHead({ site, state }: SiteState) {
+  const reach = useRosReach(site.url).data;
+  return (
+    <>
+      <h3 className={style.foundEnginesTitle}>{site.name}</h3>
+      {state.link === "down" && (
+        <p className={style.reach} role="status">
+          <b>{runnerWords(site.name)} does not answer.</b> What its robots do is not known.
+        </p>
+      )}
+      {state.link === "live" && reach?.no_reach && <NoReach why={reach.no_reach} />}
+    </>
+  );
+}
+
 export function RobotsPage({ onImport }: Props) {
   const { runner, now } = useLive();
   const may = useMay("register");
@@ -89,7 +106,7 @@ export function RobotsPage({ onImport }: Props) {
             <Link to="/runs/queue">{counted(queued, "start")} in the queue</Link>
           </p>
         )}
-        {reach?.no_reach && <NoReach why={reach.no_reach} />}
+        {now.sites === undefined && reach?.no_reach && <NoReach why={reach.no_reach} />}
         {!known && (
           <div aria-hidden>
             {[0, 1].map((i) => (
@@ -104,13 +121,22 @@ export function RobotsPage({ onImport }: Props) {
             <Practise />
           </Empty>
         )}
-        {robots.map((robot) => (
-          <RobotCard
-            key={robot.name}
-            robot={robot}
-            onEdit={(robot) => setEditing({ robot, isNew: false })}
-            onImport={onImport}
-          />
+        {(now.sites ?? [null]).map((at) => (
+          <Fragment key={at?.site.url ?? ""}>
+            {at && <SiteHead {...at} />}
+            {robots
+              .filter(
+                ({ name }) => at === null || at.state.engines.some((its) => its.name === name),
+              )
+              .map((robot) => (
+                <RobotCard
+                  key={robot.name}
+                  robot={robot}
+                  onEdit={(robot) => setEditing({ robot, isNew: false })}
+                  onImport={onImport}
+                />
+              ))}
+          </Fragment>
         ))}
         <FoundEngines may={may} onTake={take} on={reach?.no_reach === ""} />
       </div>

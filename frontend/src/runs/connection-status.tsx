@@ -1,7 +1,9 @@
 /** Words for the connection to the runner, and for the age of what the page shows of a run. */
 
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
+import { runnerWords } from "../api/http";
 import { enginesOf } from "../api/led-runs";
+import { silentSites, siteWith } from "../api/live-socket";
 import { useLive, useOldestAnswerOf, useRunSeenAt } from "../api/page-link";
 import { SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
@@ -55,7 +57,10 @@ export function ConnectionStatus({
   whose?: boolean;
   alone?: boolean;
 }) {
-  const { now } = useLive();
+  const { now: all } = useLive();
+  const site = run ? siteWith(all, run.id) : silentSites(all)[0];
+  const now = site?.state ?? all;
+  const who = runnerWords(site?.site.name);
   if (now.link === "live") {
     return (
       <span className="inline-flex gap-40">
@@ -69,11 +74,11 @@ export function ConnectionStatus({
     );
   }
   if (now.link === "connecting")
-    return <span className={style.word}>Connecting to the runner …</span>;
+    return <span className={style.word}>Connecting to {who.replace("The", "the")} …</span>;
   return (
     <span className={style.word} data-link="down" role="status">
-      <IconPlugConnectedX size={13} aria-hidden /> Runner unknown since{" "}
-      {clock(serverTimeOf(now.since))}
+      <IconPlugConnectedX size={13} aria-hidden /> {who.replace("The runner", "Runner")} unknown
+      since {clock(serverTimeOf(now.since))}
     </span>
   );
 }

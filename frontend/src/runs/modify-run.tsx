@@ -183,7 +183,7 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
 
 export function ModifyRun(props: Props) {
   const { run, obstacle } = props;
-  const { now } = useLive();
+  const { now } = useLive(run.id);
   const may = useMay(run.simulated ? "simulate" : "operate");
   const [asking, setAsking] = useState<LookedAt | null>(null);
   const look = useMutation({

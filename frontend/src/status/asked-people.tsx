@@ -231,7 +231,7 @@ function Cannot(props: FieldProps) {
 }
 
 function AnswerForm({ run, question }: { run: Run; question: Question }) {
-  const { live, runner, now } = useLive();
+  const { live, runner, now } = useLive(run.id);
   const watch = useWatching(question.moves ?? []);
   const answer = useMutation({
     mutationFn: async (said: Said | File) => {

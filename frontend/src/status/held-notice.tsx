@@ -117,7 +117,7 @@ export function laterActions(run: Run): string[] {
 }
 
 function StartButtons({ run, since }: { run: Run; since: string }) {
-  const { live, runner, now } = useLive();
+  const { live, runner, now } = useLive(run.id);
   const watch = useWatching(enginesOf(run));
   const press = useMutation({
     /** `goal`: how far it goes on; null for no limit. */

@@ -33,7 +33,7 @@ function failure(error: unknown) {
 function OutcomeForm({ run, action }: { run: Run; action: string }) {
   // Of the visit that is asked about: a word that arrives late counts for no later one.
   const piece = run.actions?.[action]?.piece ?? "";
-  const { live, runner, now } = useLive();
+  const { live, runner, now } = useLive(run.id);
   const [outcome, choose] = useState<SaidOutcome | "">("");
   const [reason, setReason] = useState("");
   // Never kept for later: the words are about what was seen a moment ago.

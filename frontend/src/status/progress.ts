@@ -255,7 +255,7 @@ export function runStatus(run: Run, { link, since }: Heard): { tone: Tone; word:
 
 /** Return the state of a run; for an end also who or what caused it. */
 export function useRunStatus(run: Run): { tone: Tone; word: string } {
-  const { now } = useLive();
+  const { now } = useLive(run.id);
   const { tone, word } = runStatus(run, now);
   return { tone, word: run.ended_at === null ? word : runEndText(run) };
 }

@@ -8,7 +8,7 @@ import { restLines } from "./rests";
 import { StateLabel } from "./state-label";
 
 export function RestList({ run, more }: { run: Run; more?: (robot: string) => ReactNode }) {
-  const { now } = useLive();
+  const { now } = useLive(run.id);
   const lines = restLines(run, now.link === "down");
   if (lines.length === 0) return null;
   return (

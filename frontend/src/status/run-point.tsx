@@ -44,7 +44,7 @@ export function RunPoint({ run, graph, id }: Props) {
 }
 
 function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string; place: Place }) {
-  const { live, runner, now } = useLive();
+  const { live, runner, now } = useLive(run.id);
   const watch = useWatching(enginesOf(run));
   const all = run.breakpoints ?? [];
   const words = runMarks(graph, all).get(id);

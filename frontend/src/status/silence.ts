@@ -1,6 +1,6 @@
 /** Tells of which actions of a run nothing is heard now: of all, or of those on robots that do not answer. */
 import { useMemo } from "react";
-import { type LiveState, silentRobots } from "../api/live-socket";
+import { type LiveState, silentRobots, stateOf } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { MOVES } from "../api/run-stop";
 import type { ActionRun, Run } from "../api/runs";
@@ -13,7 +13,7 @@ export function useUnsure(run: Run | null): Unsure {
   const { now } = useLive();
   const names = JSON.stringify([...silentRobots(now)].sort());
   const silent = useMemo(() => new Set<string>(JSON.parse(names)), [names]);
-  return (now.link === "down" && run?.ended_at === null) || silent;
+  return (stateOf(now, run?.id).link === "down" && run?.ended_at === null) || silent;
 }
 
 /**

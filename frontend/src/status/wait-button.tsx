@@ -22,7 +22,7 @@ function failure(error: unknown, run: Run) {
 }
 
 export function WaitButton({ run }: { run: Run }) {
-  const { live, runner, now } = useLive();
+  const { live, runner, now } = useLive(run.id);
   const may = useMay(run.simulated ? "simulate" : "operate");
   const wait = useMutation({
     mutationFn: () => letWait(runner ?? "", run.id),

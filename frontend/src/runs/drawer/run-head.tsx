@@ -148,7 +148,7 @@ function Ways({ run }: { run: Run }) {
 
 export function RunHead(props: Props) {
   const { run, versionLabel, told, announces, cursor, onLive, folded, onFold } = props;
-  const { now } = useLive();
+  const { now } = useLive(run.id);
   const goes = run.ended_at === null;
   const unsure = now.link === "down" && goes;
   return (
@@ -212,7 +212,7 @@ function failure(error: unknown, paused: boolean) {
 const NOBODY: readonly string[] = [];
 
 function PauseButton({ run }: { run: Run }) {
-  const { runner, now } = useLive();
+  const { runner, now } = useLive(run.id);
   const may = useMay(run.simulated ? "simulate" : "operate");
   const engine = now.engines.find((each) => each.name === abilitiesOf(run));
   const paused = run.desired === "paused";

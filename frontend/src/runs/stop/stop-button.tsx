@@ -1,7 +1,7 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 
-import type { LiveLink } from "../../api/live-socket";
-import { foreignGraphs, openRuns, unheardRobots } from "../../api/live-socket";
+import type { LiveLink, SiteState } from "../../api/live-socket";
+import { foreignGraphs, openRuns, silentSites, unheardRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import type { Run } from "../../api/runs";
 import { useWatched } from "../../ui/watched";
@@ -35,6 +35,9 @@ export function runToStop(here: readonly Run[]): { id: string; words: string } |
 
 const keepButton = (button: HTMLElement | null) => drawnStop.set(button);
 
+/** A silent site may have robots that this page has never heard of. */
+const hasNoRobot = ({ state }: SiteState) => state.engines.every(({ simulated }) => simulated);
+
 const SOFT = "A software stop: no replacement for the emergency stop.";
 
 export function StopButton() {
@@ -44,7 +47,9 @@ export function StopButton() {
   const here = graph === null ? [] : open.filter((run) => run.graph === graph);
   const meant = runToStop(here);
   const all = open.length + foreignGraphs(now).length;
-  const calm = now.link === "live" && all === 0;
+  const silent = silentSites(now);
+  const calm = now.link === "live" && all === 0 && silent.length === 0;
+  const unknown = unheardRobots(now).length + silent.filter(hasNoRobot).length;
   const target = meant?.words ?? "everything that runs";
   const beside = meant !== null && all > here.length;
   // One text in each element: what a translation wraps is then replaced whole.
@@ -66,7 +71,7 @@ export function StopButton() {
           {`STOP${meant || all === 0 ? "" : " ALL"}`}
         </span>
         <span className={style.count} aria-hidden>
-          {stopButtonText(now.link, meant ? here.length : all, unheardRobots(now).length)}
+          {stopButtonText(now.link, meant ? here.length : all, unknown)}
         </span>
       </button>
       {beside && (

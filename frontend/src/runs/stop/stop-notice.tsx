@@ -3,7 +3,13 @@
 import { useLayoutEffect, useRef, useState } from "react";
 import { engineWords } from "../../api/led-runs";
 import type { LiveState, StopRequest } from "../../api/live-socket";
-import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live-socket";
+import {
+  foreignGraphs,
+  openRuns,
+  stateOf,
+  stopTargets,
+  unheardRobots,
+} from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import type { Robot } from "../../api/robots";
 import { needsRestConfirmation } from "../../api/run-stop";
@@ -194,6 +200,38 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   return { tone: "loud", stays: true, text };
 }
 
+/** Return the notice of one runner. `dismissed`: the ids of the Stops of which nobody wants to hear more. */
+function runnerNotice(now: LiveState, dismissed: ReadonlySet<string>, at: number): StopNoticeText {
+  const last = now.stops.at(-1);
+  const watching = last !== undefined && !dismissed.has(last.id);
+  return (
+    movingAgain(now) ??
+    (watching ? noticeOf(last, now, at) : null) ??
+    othersNotice(now) ??
+    unreachableNotice(now, at)
+  );
+}
+
+const TONES = ["loud", "quiet", "done"] as const;
+
+/** Return one notice of those of several sites, the loudest first: each says at which site it is. */
+export function noticeOfSites(
+  parts: readonly { readonly name: string; readonly notice: StopNoticeText }[],
+): StopNoticeText {
+  const told = TONES.flatMap((tone) => parts.filter(({ notice }) => notice?.tone === tone));
+  const [first] = told;
+  if (first === undefined || first.notice === null) return null;
+  const text = told.map(({ name, notice }) => atSite(notice?.text ?? "", isolated(name))).join(" ");
+  const stays = told.some(({ notice }) => notice?.stays);
+  return { ...first.notice, text, ...(stays && { stays }) };
+}
+
+function atSite(text: string, site: string): string {
+  const [head = "", ...rest] = text.split(":");
+  const shouts = rest.length > 0 && /^[A-Z ]+$/.test(head);
+  return shouts ? `${head} at ${site}:${rest.join(":")}` : `${site}: ${text}`;
+}
+
 /**
  * Return the led runs of which a Stop notice tells robot by robot: those that the newest Stop means,
  * and all others that are being stopped.
@@ -284,19 +322,27 @@ function useNoticeRoom(isLoud: boolean) {
 export function StopNotice() {
   const { now } = useLive();
   const canAnswer = useWatched(mayAnswer);
-  const [dismissed, setDismissed] = useState("");
+  const [dismissed, setDismissed] = useState<ReadonlySet<string>>(new Set());
   const last = now.stops.at(-1);
-  const watching = last !== undefined && last.id !== dismissed;
+  const watching = last !== undefined && !dismissed.has(last.id);
   const open = openRuns(now).length;
-  const busy =
-    watching &&
-    (open > 0 || last.state !== "heard" || tick() - (last.provenAt ?? last.at) < GONE + 1000);
-  const at = useTick(200, busy || now.link !== "live");
+  const states = now.sites?.map(({ state }) => state) ?? [now];
+  const lasts = states.flatMap(({ stops }) => stops.at(-1) ?? []);
+  const busy = lasts.some(
+    (each) =>
+      !dismissed.has(each.id) &&
+      (open > 0 || each.state !== "heard" || tick() - (each.provenAt ?? each.at) < GONE + 1000),
+  );
+  const at = useTick(200, busy || states.some(({ link }) => link !== "live"));
   const notice =
-    movingAgain(now) ??
-    (watching ? noticeOf(last, now, at) : null) ??
-    othersNotice(now) ??
-    unreachableNotice(now, at);
+    now.sites === undefined
+      ? runnerNotice(now, dismissed, at)
+      : noticeOfSites(
+          now.sites.map(({ site: { name }, state }) => ({
+            name,
+            notice: runnerNotice(state, dismissed, at),
+          })),
+        );
   const aside = useAside(notice, last?.id ?? "");
   const element = useNoticeRoom(notice?.tone === "loud" && !aside.is);
   useRootMark("data-notice-aside", aside.is && notice !== null);
@@ -318,13 +364,15 @@ export function StopNotice() {
     );
   }
   const silent =
-    canAnswer && notice.tone === "loud" && now.link !== "down"
-      ? openRuns(now).filter(needsRestConfirmation)
+    canAnswer && notice.tone === "loud"
+      ? openRuns(now).filter(
+          (run) => needsRestConfirmation(run) && stateOf(now, run.id).link !== "down",
+        )
       : [];
   const byRobot = runsByRobot(now, watching ? last : undefined);
   const hide = notice.stays
     ? { label: "Put aside", run: aside.put }
-    : { label: "Hide", run: () => setDismissed(last?.id ?? "") };
+    : { label: "Hide", run: () => setDismissed(new Set(lasts.map(({ id }) => id))) };
   return (
     <div
       ref={element}
@@ -338,7 +386,7 @@ export function StopNotice() {
           <RobotLines
             key={run.id}
             run={run}
-            unheard={now.link === "down"}
+            unheard={stateOf(now, run.id).link === "down"}
             named={byRobot.length > 1}
           />
         ))}

@@ -1,0 +1,150 @@
+/** The live sockets of two sites as one: what is unknown at one hides nothing of the other. */
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { LiveSites } from "./live-sites";
+import { openRuns, silentRobots, unheardRobots } from "./live-socket";
+
+/** The browser's end of a socket whose other end is the test. */
+class Wire {
+  static readonly OPEN = 1;
+  static all: Wire[] = [];
+  readyState = 1;
+  sent: string[] = [];
+  onmessage: ((event: { data: string }) => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
+  readonly url: string;
+  constructor(url: string) {
+    this.url = url;
+    Wire.all.push(this);
+  }
+  send(text: string) {
+    this.sent.push(text);
+  }
+  close(code = 1000) {
+    this.readyState = 3;
+    this.onclose?.({ code });
+  }
+  say(message: object) {
+    this.onmessage?.({ data: JSON.stringify(message) });
+  }
+}
+
+const A = { name: "Hall A", url: "http://h:1" };
+const B = { name: "Hall B", url: "http://h:2" };
+const robot = (name: string, simulated = false) => ({
+  name,
+  simulated,
+  state: "answering",
+  holds: [],
+  why: "",
+});
+const run = (id: string, engine: string, at: number, more: object = {}) => ({
+  ...{ id, number: 1, engine, state: "running", ended_at: null, group: null, graph_name: "g" },
+  ...{ requested_at: `2026-11-30T10:00:0${at}Z`, unknown_since: null, desired: "running" },
+  ...{ actions: {}, alarms: [], ...more },
+});
+const wireOf = (url: string): Wire => {
+  const wire = Wire.all.findLast((each) => each.url.startsWith(url.replace("http", "ws")));
+  if (wire === undefined) throw new Error(`no socket to ${url}`);
+  return wire;
+};
+
+/** The URLs to which Stops were posted. */
+let posted: string[];
+/** URLs that do not answer. */
+let silent: string[];
+let live: LiveSites;
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  Wire.all = [];
+  posted = [];
+  silent = [];
+  vi.stubGlobal("WebSocket", Wire);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (init.method === "POST") posted.push(url);
+    if (silent.some((each) => url.startsWith(each))) throw new TypeError("no answer");
+    return Response.json({});
+  });
+  live = new LiveSites([A, B]);
+  live.open();
+  wireOf(A.url).say({
+    type: "hello",
+    engines: [robot("simulator", true), robot("Carl")],
+    runs: [run("a", "Carl", 2)],
+  });
+  wireOf(B.url).say({
+    type: "hello",
+    engines: [robot("simulator", true), robot("Dora")],
+    runs: [run("b", "Dora", 1)],
+  });
+});
+
+afterEach(() => {
+  live.close();
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("robots and runs of both are there, the newest run first, and one simulator", () => {
+  expect(live.state.link).toBe("live");
+  expect(live.state.engines.map(({ name }) => name)).toEqual(["simulator", "Carl", "Dora"]);
+  expect(openRuns(live.state).map(({ id }) => id)).toEqual(["a", "b"]);
+});
+
+test("a silent site leaves its runs and robots unknown, and those of the other as they are", () => {
+  wireOf(B.url).close(1006);
+  const { state } = live;
+  expect(state.link).toBe("live");
+  expect([...state.runs.values()].map((each) => [each.id, each.state])).toEqual([
+    ["a", "running"],
+    ["b", "unknown"],
+  ]);
+  expect(state.runs.get("b")?.unknown_since).not.toBeNull();
+  expect(unheardRobots(state).map(({ name, why }) => [name, why])).toEqual([
+    ["Dora", "The runner of Hall B does not answer."],
+  ]);
+  expect([...silentRobots(state)]).toEqual(["Dora"]);
+  const before = state.runs.get("b");
+  wireOf(A.url).say({ type: "run", run: run("a", "Carl", 2, { state: "paused" }) });
+  vi.advanceTimersByTime(200);
+  expect(live.state.runs.get("b")).toBe(before); // it is not drawn again
+});
+
+test("STOP ALL goes to each, and is heard when each has heard it", async () => {
+  silent = [B.url];
+  live.stop("all");
+  expect(posted).toEqual([`${A.url}/api/stop`, `${B.url}/api/stop`]);
+  expect(wireOf(A.url).sent.map((text) => JSON.parse(text).run)).toEqual(["all"]);
+  expect(wireOf(B.url).sent.map((text) => JSON.parse(text).run)).toEqual(["all"]);
+  await vi.advanceTimersByTimeAsync(500);
+  expect(live.state.stops.map(({ state }) => state)).toEqual(["unheard"]);
+  const [ofA, ofB] = (live.state.sites ?? []).map(({ state }) => state.stops[0]);
+  expect([ofA?.state, ofB?.state]).toEqual(["heard", "unheard"]);
+  expect(ofA?.id).toBe(ofB?.id);
+  await vi.advanceTimersByTimeAsync(1_100);
+  expect(posted.filter((url) => url.startsWith(B.url))).toHaveLength(2); // again, to B alone
+  expect(posted.filter((url) => url.startsWith(A.url))).toHaveLength(1);
+  silent = [];
+  await vi.advanceTimersByTimeAsync(1_100);
+  expect(live.state.stops.map(({ state }) => state)).toEqual(["heard"]);
+});
+
+test("STOP ALL is proven when both are at rest, and not before", async () => {
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(100);
+  const ended = { state: "stopped", ended_at: "2026-11-30T10:01:00Z", desired: "stopped" };
+  wireOf(A.url).say({ type: "run", run: run("a", "Carl", 2, ended) });
+  await vi.advanceTimersByTimeAsync(200);
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  wireOf(B.url).say({ type: "run", run: run("b", "Dora", 1, ended) });
+  await vi.advanceTimersByTimeAsync(200);
+  expect(live.state.stops[0]?.provenAt).toBeDefined();
+});
+
+test("a Stop of a run goes to its site, of an unknown one to all", () => {
+  live.stop("b");
+  expect(posted).toEqual([`${B.url}/api/runs/b/stop`]);
+  posted = [];
+  live.stop("nobody-knows");
+  expect(posted).toHaveLength(2);
+});

@@ -1,0 +1,164 @@
+/** Which site a request goes to, and how the answers of several become one. */
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { runnerAt } from "./client";
+import { registerRobot } from "./robots";
+import { setSites } from "./site-knowledge";
+import { siteRouter } from "./site-requests";
+import { type Site, setSiteRouter } from "./sites";
+
+const A: Site = { name: "Hall A", url: "http://lab:8001" };
+const B: Site = { name: "Hall B", url: "http://lab:8011" };
+const robots = new Map<Site, readonly string[] | null>();
+const live = new Set<Site>();
+/** What each site answers, by method and path; an error stands for a site that does not answer. */
+let answers: Record<string, unknown>;
+let asked: string[];
+
+beforeEach(() => {
+  robots.clear();
+  robots.set(A, ["simulator", "Carl"]).set(B, ["simulator", "Dora"]);
+  for (const site of [A, B]) live.add(site);
+  setSites([A, B], (site) => ({
+    isLive: live.has(site),
+    robots: robots.get(site) === null ? null : new Set(robots.get(site)),
+    hasRun: (id) => id === (site === B ? "ofB" : "ofA"),
+  }));
+  setSiteRouter(siteRouter([A, B]));
+  answers = {};
+  asked = [];
+  vi.stubGlobal("fetch", async (url: string, { method }: RequestInit) => {
+    const said = `${method} ${url.replace("http://lab:", "")}`;
+    asked.push(said);
+    const [found] = Object.entries(answers)
+      .filter(([key]) => said.startsWith(key))
+      .sort(([a], [b]) => b.length - a.length);
+    if (found === undefined) return new Response("{}", { status: 404 });
+    if (found[1] instanceof Error) throw found[1];
+    return Response.json(found[1]);
+  });
+});
+
+afterEach(() => {
+  setSiteRouter(undefined);
+  vi.unstubAllGlobals();
+});
+
+const runner = runnerAt(A.url);
+const start = (body: object) => runner.post("/api/runs", { body: body as never });
+
+test("a start goes to the site of its robot, once", async () => {
+  answers = { POST: { id: "new" } };
+  await start({ engine: "Dora", request_id: "x" });
+  await start({ engine: "conducted", robots: { a: "Dora", b: "simulator" } });
+  await start({ engine: "simulator" });
+  expect(asked).toEqual(["POST 8011/api/runs", "POST 8011/api/runs", "POST 8001/api/runs"]);
+});
+
+test("what became of a start is asked where it was sent", async () => {
+  answers = { "": { runs: [], under_way: false, queued: null } };
+  await start({ engine: "Dora", request_id: "mine" });
+  asked = [];
+  await runner.get("/api/starts/{request_id}", { path: { request_id: "mine" } });
+  expect(asked).toEqual(["GET 8011/api/starts/mine"]);
+});
+
+test("a start is not said to be nowhere while a site does not answer", async () => {
+  const none = { runs: [], under_way: false, queued: null };
+  const look = () => runner.get("/api/starts/{request_id}", { path: { request_id: "lost" } });
+  answers = { "GET 8001": none, "GET 8011": none };
+  expect((await look()).runs).toEqual([]);
+  answers = { "GET 8001": none, "GET 8011": new TypeError("refused") };
+  await expect(look()).rejects.toThrow("The runner of Hall B does not answer.");
+  answers = { "GET 8001": { ...none, runs: [{ id: "r" }] }, "GET 8011": new TypeError("refused") };
+  expect((await look()).runs).toEqual([{ id: "r" }]);
+});
+
+test("robots of two sites in one start are refused, and nothing is sent", async () => {
+  const both = start({ engine: "conducted", robots: { a: "Carl", b: "Dora" } });
+  await expect(both).rejects.toThrow("of several sites: Carl at Hall A; Dora at Hall B.");
+  robots.set(A, ["Dora"]);
+  await expect(start({ engine: "Dora" })).rejects.toThrow("Dora at Hall A and Hall B");
+  expect(asked).toEqual([]);
+});
+
+test("a robot that nobody knows is not started while a site has not said its robots", async () => {
+  robots.set(B, null);
+  await expect(start({ engine: "Dora" })).rejects.toThrow("It is not known where Dora is: Hall B");
+  expect(asked).toEqual([]);
+});
+
+test("what concerns a run goes to its site, and an unknown one is looked for", async () => {
+  answers = { "GET 8011/api/runs/else": { id: "else" }, "POST 8011": { id: "else" } };
+  await runner.post("/api/runs/{run}/pause", { path: { run: "ofB" } });
+  await runner.get("/api/runs/{run}", { path: { run: "else" } });
+  await runner.post("/api/runs/{run}/pause", { path: { run: "else" } });
+  expect(asked).toEqual([
+    "POST 8011/api/runs/ofB/pause",
+    "GET 8001/api/runs/else",
+    "GET 8011/api/runs/else",
+    "POST 8011/api/runs/else/pause",
+  ]);
+});
+
+test("runs of both are one list by time, page by page", async () => {
+  const at = (id: string, second: number) => ({
+    id,
+    requested_at: `2026-11-30T10:00:0${second}Z`,
+  });
+  answers = {
+    "GET 8001/api/runs?limit=2&before=a2": [at("a1", 1)],
+    "GET 8001/api/runs?limit=2": [at("a3", 5), at("a2", 3)],
+    "GET 8011/api/runs?limit=2&before=b2": [at("b1", 2)],
+    "GET 8011/api/runs?limit=2": [at("b2", 4), at("b1", 2)],
+  };
+  const page = async (before?: string) =>
+    (await runner.get("/api/runs", { query: { limit: 2, before } })).map(({ id }) => id);
+  expect(await page()).toEqual(["a3", "b2"]);
+  answers["GET 8001/api/runs?limit=2&before=a3"] = [at("a2", 3), at("a1", 1)];
+  expect(await page("b2")).toEqual(["a2", "b1"]);
+  answers["GET 8011/api/runs?limit=2&before=b1"] = [];
+  expect(await page("b1")).toEqual(["a1"]);
+});
+
+test("a site that does not answer hides no run of the others", async () => {
+  answers = { "GET 8001": [{ id: "a", requested_at: "2026-11-30T10:00:00Z" }] };
+  answers["GET 8011"] = new TypeError("refused");
+  expect(await runner.get("/api/runs", { query: { limit: 2 } })).toHaveLength(1);
+});
+
+test("a revocation is told to both, and who was not reached is named", async () => {
+  answers = { "POST 8001": {}, "POST 8011": new TypeError("refused") };
+  const told = runner.post("/api/revocations", { body: { person: "p" } });
+  await expect(told).rejects.toThrow("Hall B: The runner of Hall B does not answer.");
+  expect(asked.sort()).toEqual(["POST 8001/api/revocations", "POST 8011/api/revocations"]);
+});
+
+test("the name of a robot is unique, and not given while another site is silent", async () => {
+  const robot = { name: "Dora" } as Parameters<typeof registerRobot>[1];
+  await expect(registerRobot(A.url, robot)).rejects.toThrow("Dora is registered at Hall B");
+  robots.set(B, []);
+  live.delete(B);
+  await expect(registerRobot(A.url, robot)).rejects.toThrow("Hall B does not say its robots");
+  live.add(B);
+  answers = { POST: { name: "Dora" } };
+  await registerRobot(A.url, robot);
+  expect(asked).toEqual(["POST 8001/api/robots"]);
+});
+
+test("each engine is looked at by its own site, in the order that was asked for", async () => {
+  answers = { "POST 8001": [{ engine: "Carl" }], "POST 8011": [{ engine: "Dora" }] };
+  const body = { engines: ["Dora", "Carl"] } as never;
+  const looks = await runner.post("/api/preflight", { body });
+  expect(looks.map(({ engine }) => engine)).toEqual(["Dora", "Carl"]);
+});
+
+test("Stop of a robot goes to each site that may have it", async () => {
+  answers = { POST: {} };
+  const stop = (name: string) => runner.post("/api/robots/{name}/stop", { path: { name } });
+  await stop("Dora");
+  robots.set(A, ["Dora"]);
+  await stop("Dora");
+  robots.set(A, null).set(B, null);
+  await stop("Dora");
+  expect(asked.map((each) => each.slice(5, 9))).toEqual(["8011", "8001", "8011", "8001", "8011"]);
+});
