@@ -11,7 +11,7 @@ interface PendingDraft {
   readonly text: string;
   /** Writes it and drops it; null while it does not fit its field, or waits for a button. */
   readonly write: (() => void) | null;
-  /** It is written when its person presses Enter or leaves the field, not by itself. */
+  /** True if the draft is written when its person presses Enter or leaves the field, not by itself. */
   readonly held?: boolean;
 }
 

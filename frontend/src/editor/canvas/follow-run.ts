@@ -216,7 +216,7 @@ interface Followed {
   progress: ReadonlyMap<Key, Progress>;
   /** The folded frame that hides each hidden element. */
   blockOf: ReadonlyMap<Key, string> | undefined;
-  /** Something else than the run is shown: a dry-run, or the past. */
+  /** True while a dry-run or the past is shown instead of the run. */
   aside: boolean;
   /** Called when the run has ended, if the view has followed it to its end. */
   onEnd: () => void;

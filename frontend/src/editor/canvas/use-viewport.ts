@@ -78,7 +78,7 @@ interface ViewportInput {
   progress: ReadonlyMap<Key, Progress>;
   /** The id of the current run; null without one. */
   run: string | null;
-  /** Something else than the run is shown: a dry-run, or the past. */
+  /** True while a dry-run or the past is shown instead of the run. */
   aside: boolean;
   /** The place of the pointer over the canvas, on screen. */
   pointer: RefObject<Position | null>;

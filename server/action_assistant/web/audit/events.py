@@ -5,12 +5,12 @@ other facts of the audit are events of other streams, whose bodies hold the orig
 (`web/auth/caller.py`).
 """
 
-from datetime import UTC, datetime
 from typing import ClassVar, Final, Literal, Protocol
 
 import msgspec
 
 from action_assistant.journal.events import Draft
+from action_assistant.kit.moments import moment
 from action_assistant.web.auth.caller import stamped
 from action_assistant.web.auth.confirmations import ConfirmedBy
 from action_assistant.web.auth.sessions import SignInMeans
@@ -23,7 +23,7 @@ KEEPING: Final = "audit-keeping"
 
 def stream_at(at: int) -> str:
     """Return the name of the stream for facts at a time (µs UTC): that of its month."""
-    return f"{STREAM}/{datetime.fromtimestamp(at / 1_000_000, UTC):%Y-%m}"
+    return f"{STREAM}/{moment(at):%Y-%m}"
 
 
 def is_of_month(stream: str) -> bool:

@@ -1,7 +1,7 @@
 """Pages of the audit: rows that are read from the log of one process, the newest first."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, get_args
 
 import msgspec
@@ -9,6 +9,7 @@ from sqlalchemy import Connection, Select, func, select
 
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
+from action_assistant.kit.moments import moment
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.audit.events import KEEPING, AuditDropped
 from action_assistant.web.auth.caller import Origin, origin_in
@@ -200,7 +201,7 @@ def _newest(found: Sequence[tuple[int, AuditDropped]]) -> DroppedRows | None:
     if not found:
         return None
     at, dropped = max(found, key=lambda each: each[1].until)
-    return DroppedRows(_utc(dropped.until), _utc(at), dropped.days)
+    return DroppedRows(moment(dropped.until), moment(at), dropped.days)
 
 
 def _times(connection: Connection, position: int) -> tuple[int | None, int | None]:
@@ -226,7 +227,7 @@ def _row(branch: Branch, event: Event, wanted: AuditFilter, describe: Describe) 
     found = AuditRow(
         id=f"{branch}:{event.position}",
         position=event.position,
-        at=_utc(event.at if fact.at is None else fact.at),
+        at=moment(event.at if fact.at is None else fact.at),
         kind=fact.kind,
         event=event.kind,
         text=fact.text,
@@ -274,11 +275,7 @@ def _holds(row: AuditRow, text: str) -> bool:
 
 
 def _when(at: int | None) -> datetime | None:
-    return None if at is None else _utc(at)
-
-
-def _utc(at: int) -> datetime:
-    return datetime.fromtimestamp(at / 1_000_000, UTC)
+    return None if at is None else moment(at)
 
 
 def kinds_of(names: Iterable[str]) -> tuple[AuditKind, ...]:
