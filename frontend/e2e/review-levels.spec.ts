@@ -85,11 +85,11 @@ const opens = (page: Page, way: string) =>
 test("what ran inside opens in place, level by level or all at once, and stays open in the replay", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/runs/${runs[1]}`);
-  await expect(lanes(page)).toHaveText([/^Greet_0/, /^Fetch_0/]);
+  await expect(lanes(page)).toHaveText([/^Greet 0/, /^Fetch 0/]);
   await expect(opens(page, "Fetch 0")).toHaveAttribute("aria-expanded", "false");
   await opens(page, "Fetch 0").focus();
   await page.keyboard.press("Enter");
-  await expect(lanes(page)).toHaveText([/^Greet_0/, /^Fetch_0/, /^Drive_0/, /^Grip_0/]);
+  await expect(lanes(page)).toHaveText([/^Greet 0/, /^Fetch 0/, /^Drive 0/, /^Grip 0/]);
   await opens(page, "Fetch 0 › Grip 0").click();
   await expect(lanes(page)).toHaveCount(6);
   expect(await violations(page)).toEqual([]);
@@ -136,7 +136,7 @@ test("two runs are compared inside, and statistics count by levels; on a phone, 
   const { page } = ada;
   await page.setViewportSize({ width: 390, height: 844 });
   await page.goto(`${product.url}/runs/compare?a=${runs[0]}&b=${runs[1]}`);
-  await expect(page.getByText("Fetch_0 › Grip_0 › CloseFingers_0: true in run 1")).toBeVisible();
+  await expect(page.getByText("Fetch 0 › Grip 0 › CloseFingers 0: true in run 1")).toBeVisible();
   const both = page.getByRole("region", { name: "Both runs over time" });
   await expect(both.getByRole("listitem")).toHaveCount(2);
   await page.getByRole("button", { name: "All levels" }).click();
@@ -145,7 +145,7 @@ test("two runs are compared inside, and statistics count by levels; on a phone, 
   expect(await violations(page)).toEqual([]);
   await page.goto(`${product.url}/runs/statistics?graph=${round}`);
   await expect(
-    page.getByRole("row").filter({ hasText: "Fetch_0 › Grip_0 › CloseFingers_0" }),
+    page.getByRole("row").filter({ hasText: "Fetch 0 › Grip 0 › CloseFingers 0" }),
   ).toContainText("2");
   await page.goto(`${product.url}/runs/${runs[1]}`);
   await opens(page, "Fetch 0").click();

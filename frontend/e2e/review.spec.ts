@@ -174,7 +174,7 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
   await page.getByLabel(`Choose run ${good.number} to compare`).check();
   await page.getByLabel(`Choose run ${bad.number} to compare`).check();
   await page.getByRole("button", { name: "Compare the two" }).click();
-  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await expect(page.getByText(/then Wait 1: true in run \d+, error in run \d+/)).toBeVisible();
   await expect(page.getByText("gripper jammed")).toBeVisible();
   await expect(page.getByText("Both ran exactly the same graph.")).toBeVisible();
   const canvas = page.getByRole("region", { name: "Both runs on the graph" });
@@ -188,7 +188,7 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
     "data-parting",
   );
   await page.getByRole("tab", { name: "Step by step" }).click();
-  await expect(page.getByRole("row", { name: /Wait_1/ })).toContainText("here they part");
+  await expect(page.getByRole("row", { name: /Wait 1/ })).toContainText("here they part");
 });
 
 test("new runs wait behind a pill, so that nothing moves under the finger", async () => {
@@ -310,9 +310,9 @@ test("the list is walked by keys, and the run before is one click away", async (
   const failed = page.getByRole("row").filter({ hasText: `Run ${bad.number}` });
   await expect(failed.getByRole("img", { name: /^Course: true, error/ })).toBeVisible();
   await failed.getByRole("link", { name: `Compare with ${good.number}` }).click();
-  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await expect(page.getByText(/then Wait 1: true in run \d+, error in run \d+/)).toBeVisible();
   await page.goto(`${product.url}/runs/compare?b=${bad.id}`);
-  await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
+  await expect(page.getByText(/then Wait 1: true in run \d+, error in run \d+/)).toBeVisible();
   await page.getByRole("link", { name: "Another run" }).click();
   await expect(page.getByText("Which run do you want to compare with?")).toBeVisible();
 });

@@ -220,7 +220,7 @@ test("a failure: its cause, its lane, and the replay that does not know it yet",
   expect(runs.good?.state).toBe("finished");
   await open(page, runs.bad);
   await expect(why(page)).toContainText("Jam ended in error");
-  await expect(lanes(page).getByRole("listitem").filter({ hasText: "Jam_0" })).toContainText(
+  await expect(lanes(page).getByRole("listitem").filter({ hasText: "Jam 0" })).toContainText(
     "error",
   );
   await page.getByRole("button", { name: "To the start" }).click();
@@ -297,7 +297,7 @@ test("two robots share the timeline, with who stopped them and what proves it", 
   for (const robot of ["David", "Eve"]) {
     await expect(lanes(page).getByText(robot, { exact: true })).toBeVisible(); // above its lanes
   }
-  await expect(lanes(page).getByText("Patrol_0")).toHaveCount(2);
+  await expect(lanes(page).getByText("Patrol 0")).toHaveCount(2);
   await expect(page.getByText(/pressed Stop$/).first()).toBeVisible();
   await expect(page.getByTitle("Proven: nothing runs any more").first()).toBeVisible();
 });

@@ -89,8 +89,8 @@ test("a number stands only where a name is not enough", () => {
   ];
   const graph = graphOf(doc);
   expect([a, b, c, "gone"].map((key) => nameOf(graph, key))).toEqual([
-    "A_0",
-    "A_1",
+    "A 0",
+    "A 1",
     "C",
     "something deleted",
   ]);

@@ -10,7 +10,6 @@ import { endLabel } from "./field-words";
 import {
   ENTRY,
   EXIT,
-  fullName,
   type Graph,
   type Key,
   PRECONDITIONS,
@@ -37,7 +36,7 @@ export function nameOf(graph: Graph, key: Key): string {
   if (action === undefined) return "something deleted";
   const shared = graph.actions.some((other) => other !== action && other.name === action.name);
   const name = shownName(action.name);
-  return shared ? fullName({ ...action, name }) : name;
+  return shared ? `${name} ${action.instanceId}` : name;
 }
 
 /** Returns what one arrow makes its child do, one sentence for each thing. */
@@ -190,5 +189,6 @@ export function endName(graph: Graph, key: Key): string {
   const action = graph.actions.find((candidate) => candidate.key === key);
   if (!action) return "something deleted";
   const shared = graph.actions.some((other) => other !== action && other.name === action.name);
-  return shared ? `${isolated(action.name)} ${action.instanceId}` : action.name;
+  const name = shownName(action.name);
+  return shared ? `${isolated(name)} ${action.instanceId}` : name;
 }

@@ -19,7 +19,7 @@ import { getRun } from "../api/run-stop";
 import { type Run, useRun, type Visit } from "../api/runs";
 import { DifferenceView } from "../differences/difference-view";
 import { boundsText, durationText } from "../status/durations";
-import { INTO } from "../status/level-places";
+import { wayWords } from "../status/level-places";
 import { howWords, runEndText, useRunStatus, visitDuration } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
@@ -34,6 +34,7 @@ import {
   differencesOf,
   outermostAid,
   sameAsSeen,
+  spokenOf,
   valueDifferences,
 } from "./differences";
 import { GhostLanes } from "./ghost-lanes";
@@ -86,7 +87,7 @@ function Verdict({ found }: { found: Comparison }) {
       <IconArrowsDiff size={18} aria-hidden />
       <div>
         <p>
-          <b>{found.text}</b>
+          <b>{spokenOf(found, found.text)}</b>
           {cause !== null && <span> {cause}</span>}
         </p>
         <Said found={found} />
@@ -420,7 +421,7 @@ function Steps({ found }: { found: Comparison }) {
             data-parting={is(step) || undefined}
           >
             <th scope="row">
-              <bdi>{[...step.levels, step.name].join(INTO)}</bdi>
+              <bdi>{wayWords(step)}</bdi>
               {step.visit > 1 && <span className={style.none}> visit {step.visit}</span>}
             </th>
             <td>

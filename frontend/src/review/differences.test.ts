@@ -11,6 +11,7 @@ import {
   outermostAid,
   overlap,
   sameAsSeen,
+  spokenOf,
   valueDifferences,
 } from "./differences";
 
@@ -209,4 +210,12 @@ test("values with which only one of two runs was started are differences, and eq
   const ran = comparison([closes], { a: runs[0], b: runs[1] } as unknown as Partial<Comparison>);
   expect(differenceCount(ran)).toBe(3);
   expect(causeSentence(ran)).not.toContain("Nothing that is known differed");
+});
+
+test("the verdict calls actions as people do, inside of each other too", () => {
+  const steps = [step("AaConfirm_0", {}), step("Lift_1", { levels: ["Fetch_0"] })];
+  const text = "The same until AaConfirm_0, then Fetch_0 › Lift_1: true in run 1.";
+  expect(spokenOf({ steps }, text)).toBe(
+    "The same until Confirm 0, then Fetch 0 › Lift 1: true in run 1.",
+  );
 });

@@ -7,6 +7,7 @@ import { engineWords } from "../api/led-runs";
 import type { ComparedField, ComparedStep, Comparison } from "../api/review";
 import type { Visit } from "../api/runs";
 import { plainValue } from "../differences/difference-words";
+import { spokenText } from "../graph/field-words";
 import { boundsText } from "../status/durations";
 import { INTO, spaced, wayWords } from "../status/level-places";
 import { visitDuration } from "../status/progress";
@@ -211,7 +212,7 @@ const ARROW_DECIDES = /^(on_|required$|remap\/)/;
  * nearest earlier difference; null if none is known.
  */
 export function likelyCause(found: Comparison): string | null {
-  if (found.because) return found.because.text;
+  if (found.because) return spokenOf(found, found.because.text);
   const { parting } = found;
   if (parting === null) return null;
   const { step } = parting;
@@ -237,6 +238,12 @@ export function likelyCause(found: Comparison): string | null {
   if (!found.same_engine)
     return `they ran on ${engineWords(found.a)} and on ${engineWords(found.b)}`;
   return null;
+}
+
+/** Return a sentence about two runs with the names of actions as people say them. */
+export function spokenOf(found: Pick<Comparison, "steps">, text: string): string {
+  const known = new Set(found.steps.flatMap(({ name, levels }) => [name, ...levels]));
+  return spokenText(text, known, spaced);
 }
 
 /** The likely cause as a sentence, or that there is none. */

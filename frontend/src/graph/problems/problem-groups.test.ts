@@ -108,3 +108,13 @@ test.each(vectors.graphs)("as many of each as the vectors say: $about", (vector)
     to_fill_in: vector.to_fill_in,
   });
 });
+
+test("problems call actions as their cards do", () => {
+  const doc = new Y.Doc();
+  addAction(doc, { name: "AaConfirm" });
+  addAction(doc, { name: "Grip" });
+  addAction(doc, { name: "Grip" });
+  const message = "AaConfirm_0 waits for Grip_1, Grip_0 and Lift_0.";
+  const [told] = problemGroups([problem("H2", "", { message })], readGraph(mapsOf(doc)));
+  expect(told?.message).toBe("Confirm waits for Grip 1, Grip and Lift_0.");
+});

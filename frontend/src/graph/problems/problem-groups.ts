@@ -1,7 +1,7 @@
 /** Groups checked problems for people: one thing is shown once, however many fields it has. Pure. */
 
-import { pathWords } from "../field-words";
-import type { Action, Graph, Key } from "../model";
+import { pathWords, spokenText } from "../field-words";
+import { type Action, fullName, type Graph, type Key } from "../model";
 import { type DataFlow, dataFlowOf, readValue } from "../parameters/data-flow";
 import { groupOf } from "../parameters/groups";
 import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
@@ -64,6 +64,7 @@ function unwrittenWords(group: string, paths: readonly string[], isAsked: boolea
 function told<P extends CheckedProblem>(
   { id, kind, group, problems }: Gathered<P>,
   actions: ReadonlyMap<Key, Action>,
+  names: ReadonlySet<string>,
 ): ProblemGroup<P> {
   const [first] = problems;
   const inputs = group === null ? [] : problems.flatMap((each) => inputOf(each) ?? []);
@@ -73,7 +74,8 @@ function told<P extends CheckedProblem>(
     kind,
     blocks: !isAsked && problems.some(({ severity }) => severity === "error"),
     code: first.code,
-    message: group === null ? first.message : unwrittenWords(group, inputs, isAsked),
+    message:
+      group === null ? spokenText(first.message, names) : unwrittenWords(group, inputs, isAsked),
     place: placeOf(first),
     group,
     inputs,
@@ -118,8 +120,11 @@ export function problemGroups<P extends CheckedProblem>(
     if (known) known.problems.push(problem);
     else found.set(id, { id, kind, group, problems: [problem] });
   }
+  const names = new Set(graph.actions.map(fullName));
   const rank = ({ kind, blocks }: ProblemGroup) => 2 * ORDER[kind] + (blocks ? 0 : 1);
-  return [...found.values()].map((each) => told(each, actions)).sort((a, b) => rank(a) - rank(b));
+  return [...found.values()]
+    .map((each) => told(each, actions, names))
+    .sort((a, b) => rank(a) - rank(b));
 }
 
 /** Returns the other places that have the same problem. */

@@ -6,7 +6,7 @@ import type { Visit } from "../../api/runs";
 import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
-import { wayWords } from "../level-places";
+import { spaced, wayWords } from "../level-places";
 import { type Progress, type Tone, visitsText } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
 import { type Bar, barOf, growingWay, shareOf, type TimeAxis, useMoving } from "./axis";
@@ -52,7 +52,7 @@ function LaneName({ lane, onPick, opened, nested, onOpen }: Omit<Props, "visits"
       >
         <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
         <span className="truncate">
-          <bdi>{lane.label}</bdi>
+          <bdi>{spaced(lane.label)}</bdi>
         </span>
       </button>
     </span>
