@@ -20,6 +20,7 @@ import {
 import { toneColor } from "../status/state-label";
 import { clock, instant } from "../ui/times";
 import { isolated } from "../words/isolated";
+import { isListed, LevelChoice, LevelWord, type LogLevel } from "./log-levels";
 import { markText } from "./replay-controls";
 import style from "./run-events.module.css";
 import { NoteHere, noteText } from "./run-notes";
@@ -31,6 +32,8 @@ interface Happening {
   /** The action as the run calls it. */
   fact: string | null;
   text: string;
+  /** The level of a line of the engine's log. */
+  level?: LogLevel;
   /**
    * Order among events of one moment: an inner action ends before its outer one, and begins after
    * it.
@@ -119,7 +122,9 @@ export function eventLines(
   }
   for (const line of run.log ?? []) {
     const at = instant(line.at);
-    if (at !== null) all.push({ at, tone: "idle", name: "engine", fact: null, text: line.text });
+    if (at === null) continue;
+    const { text, level = "" } = line;
+    all.push({ at, tone: "idle", name: "engine", fact: null, text, level });
   }
   for (const mark of marks) {
     const at = instant(mark.at);
@@ -197,6 +202,11 @@ function Line(
             <bdi>{event.name}</bdi>
           </button>
         )}{" "}
+        {event.level !== undefined && (
+          <>
+            <LevelWord level={event.level} />{" "}
+          </>
+        )}
         <span style={event.tone === "idle" ? {} : { color: toneColor[event.tone] }}>
           {event.text}
         </span>
@@ -208,6 +218,7 @@ function Line(
 export function RunEvents(props: Props) {
   const { runner, run, version, marks, notes, selected } = props;
   const [search, setSearch] = useState("");
+  const [least, setLeast] = useState<LogLevel>("debug");
   const start = instant(run.started_at) ?? 0;
   const by = useCurrentName(run.author);
   const all = useMemo(
@@ -216,7 +227,9 @@ export function RunEvents(props: Props) {
   );
   const wanted = search.trim().toLowerCase();
   const found = all.filter(
-    (event) => wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted),
+    (event) =>
+      isListed(event.level, least) &&
+      (wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted)),
   );
   const shown = found.slice(-SHOWN);
   return (
@@ -230,6 +243,7 @@ export function RunEvents(props: Props) {
           value={search}
           onChange={(event) => setSearch(event.currentTarget.value)}
         />
+        {(run.log ?? []).length > 0 && <LevelChoice least={least} onLeast={setLeast} />}
         <NoteHere runner={runner} run={run} at={props.at} />
       </div>
       {found.length > shown.length && (

@@ -30,6 +30,7 @@ REQUESTED = events.Requested(
     [
         (REQUESTED, {"Ada", "Round", "atlas", "E1", "the gate is blocked today"}),
         (events.EngineSaid(at=2, text="map::at"), {"map::at"}),
+        (events.EngineSaid(at=2, text="map::at", level="warn"), {"map::at", "warn"}),
         (events.AlarmRaised(at=2, code="stalled", text="Lift waits"), {"stalled", "Lift waits"}),
         (events.MovesAgain(at=3, text="Lift moves again"), {"Lift moves again"}),
         (events.Observed(at=4, seen=()), set()),

@@ -1593,12 +1593,18 @@ export interface RunnerApi {
     };
     /**
      * MessageShown
-     * @description A message of an action, or a line of the engine's log.
+     * @description A message of an action, or a line of the engine's log. `level`: of a line; left out if it is not
+     *     known, as in runs of earlier versions.
      */
     MessageShown: {
         /** Format: date-time */
         at: string;
         text: string;
+        /**
+         * @default
+         * @enum {string}
+         */
+        level?: "" | "debug" | "error" | "fatal" | "info" | "warn";
     };
     /**
      * ModifyRequest

@@ -580,7 +580,7 @@ class OpenRun:
     def _hear_line(self, line: EngineLog) -> None:
         if self._is_ours(line.graph) and self._lines < _LINES:
             self._lines += 1
-            self.tell(EngineSaid(line.at, line.text[:_LONGEST_LINE]))
+            self.tell(EngineSaid(line.at, line.text[:_LONGEST_LINE], line.level))
         with self._changing() as changes:
             self.watch.hear(changes, line.text)
 

@@ -32,6 +32,10 @@ FAR: Final = {
 TERMINAL: Final = frozenset({"FINISHED", "HALTED", "STOPPED", "ERROR"})
 
 
+#: How grave a line of an engine's log is; "" where that was not recorded.
+LogLevel: TypeAlias = Literal["", "debug", "info", "warn", "error", "fatal"]
+
+
 class NodeState(
     msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="node_state", tag_field="kind"
 ):

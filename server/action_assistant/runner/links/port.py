@@ -15,7 +15,7 @@ import msgspec
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.hardware_stop import HardwareStop, StopSignal
 from action_assistant.runner.links.health import HealthCheck, HealthSignal
-from action_assistant.runner.links.observations import Exact, Snapshot
+from action_assistant.runner.links.observations import Exact, LogLevel, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph, Precondition
 from action_assistant.umrf.semantics import Call
@@ -147,11 +147,12 @@ class Feedback(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EngineLog(msgspec.Struct, frozen=True, kw_only=True):
-    """A line of the engine's log, for people to read; it proves nothing."""
+    """A line of the engine's log, for people to read; it proves nothing. `level`: "" if unknown."""
 
     at: int
     text: str
     graph: str | None = None
+    level: LogLevel = ""
 
 
 class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):

@@ -13,7 +13,7 @@ import msgspec
 from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.health import HealthNow
-from action_assistant.runner.links.observations import Seen
+from action_assistant.runner.links.observations import LogLevel, Seen
 from action_assistant.runner.runs.author import Author as Author
 from action_assistant.runner.runs.earlier import Before, Earlier, StartFrom
 from action_assistant.runner.runs.page_presence import PagePresence
@@ -279,14 +279,15 @@ class AlarmRaised(msgspec.Struct, frozen=True):
     text: str
 
 
-class EngineSaid(msgspec.Struct, frozen=True):
+class EngineSaid(msgspec.Struct, frozen=True, omit_defaults=True):
     """A line of the engine's own log about this run. It is evidence for a person and proves
-    nothing."""
+    nothing. `level`: "" if unknown, as in events of earlier versions."""
 
     kind: ClassVar[str] = "run.engine_said.v1"
 
     at: int
     text: str
+    level: LogLevel = ""
 
 
 class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):

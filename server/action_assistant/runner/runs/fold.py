@@ -189,7 +189,7 @@ def follow(run: Run, event: RunEvent) -> Run:
         case MovesAgain():
             return _reopen(run, event)
         case EngineSaid():
-            return replace(run, log=(*run.log, Message(event.at, event.text))[-KEPT:])
+            return replace(run, log=(*run.log, Message(event.at, event.text, event.level))[-KEPT:])
         case Unconfirmed(lost=True):
             return replace(run, lost=event.why)
         case Unconfirmed():

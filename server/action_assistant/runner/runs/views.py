@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.kit.moments import moment
+from action_assistant.runner.links.observations import LogLevel
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.course_bar import CoursePart, stored_course
 from action_assistant.runner.runs.durations import DurationBounds, of_run
@@ -145,11 +146,13 @@ class SaidShown(msgspec.Struct, frozen=True):
     reason: str
 
 
-class MessageShown(msgspec.Struct, frozen=True):
-    """A message of an action, or a line of the engine's log."""
+class MessageShown(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A message of an action, or a line of the engine's log. `level`: of a line; left out if it is not
+    known, as in runs of earlier versions."""
 
     at: datetime
     text: str
+    level: LogLevel = ""
 
 
 class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -672,7 +675,7 @@ def _action_view(
 
 
 def _log(run: Run, most: int) -> list[MessageShown]:
-    return [MessageShown(time(each.at), each.text) for each in run.log[-most:]]
+    return [MessageShown(time(each.at), each.text, each.level) for each in run.log[-most:]]
 
 
 def _time(us: int | None) -> datetime | None:

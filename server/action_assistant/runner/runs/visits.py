@@ -32,7 +32,7 @@ from typing import Final, Literal, TypeAlias, TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.runner.links.observations import ACTIVE, FAR, NodeResult
+from action_assistant.runner.links.observations import ACTIVE, FAR, LogLevel, NodeResult
 
 T = TypeVar("T")
 
@@ -109,10 +109,11 @@ class SnapshotEvidence(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
 
 class Message(msgspec.Struct, frozen=True, gc=False):
-    """A message of an action, or a line of the engine's log."""
+    """A message of an action, or a line of the engine's log. `level`: of a line; "" if unknown."""
 
     at: int
     text: str
+    level: LogLevel = ""
 
 
 class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):

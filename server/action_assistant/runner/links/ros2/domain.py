@@ -336,7 +336,7 @@ class Domain:
         self._tell(Feedback(actor=message.actor, snapshots=tuple(seen)))
 
     def _log_line(self, message: Log) -> None:
-        self._tell(LogLine(message.name, message.msg))
+        self._tell(LogLine(message.name, message.msg, message.level))
 
     def _tell(self, value: RosValue) -> None:
         """Queue a value for the event loop; called on the thread of this domain."""

@@ -397,7 +397,12 @@ class Ros2Link:
                 if self._domain and self._said(value.logger):
                     self._domain.outlets.said(self._name, value.text)
                     self._subscribers.tell(
-                        EngineLog(at=self._clock_us(), text=value.text.strip(), graph=value.graph)
+                        EngineLog(
+                            at=self._clock_us(),
+                            text=value.text.strip(),
+                            graph=value.graph,
+                            level=value.level,
+                        )
                     )
             case _:
                 assert_never(value)

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.observations import LogLevel, Snapshot
 from action_assistant.runner.links.port import Command, Feedback
 
 #: A name may have blanks and quotes in it, so that the engine's own words around it say where it ends.
@@ -46,11 +46,27 @@ class OverheardCommand(msgspec.Struct, frozen=True, kw_only=True):
     sender: str
 
 
+#: The words for the levels of ROS 2 (rcl_interfaces/msg/Log).
+_LEVELS: Final[dict[int, LogLevel]] = {
+    10: "debug",
+    20: "info",
+    30: "warn",
+    40: "error",
+    50: "fatal",
+}
+
+
 class LogLine(msgspec.Struct, frozen=True):
-    """A line of a node's log."""
+    """A line of a node's log. `number`: the level in the message; 0 for none."""
 
     logger: str
     text: str
+    number: int = 0
+
+    @property
+    def level(self) -> LogLevel:
+        """The level as a word; "" if ROS 2 has no word for its number."""
+        return _LEVELS.get(self.number, "")
 
     @property
     def graph(self) -> str | None:
