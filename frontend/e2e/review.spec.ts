@@ -347,8 +347,8 @@ test("statistics tell how often it succeeds and which action fails", async () =>
   await page.goto(`${product.url}/runs?graph=${graph}`);
   await page.getByRole("link", { name: "Statistics", exact: true }).click();
   await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
-  await expect(page.getByRole("row", { name: /Wait_1/ })).toBeVisible();
-  await expect(page.getByText(/Wait_1.*visits|1 of \d+ visits/).first()).toBeVisible();
+  await expect(page.getByRole("row", { name: /Wait 1/ })).toBeVisible();
+  await expect(page.getByText(/Wait 1.*visits|1 of \d+ visits/).first()).toBeVisible();
 });
 
 test("a part of the time is looked at more closely, and a link carries it", async ({ browser }) => {

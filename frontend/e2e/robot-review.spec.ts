@@ -278,7 +278,7 @@ test("figures of a robot say what is not known, and between which bounds the res
   const success = page.locator("section").filter({ hasText: "Success" }).first();
   await expect(success).toContainText("1 finished with an unknown result");
   await expect(page.getByText(/arrows? it is not known whether/)).toBeVisible();
-  await expect(page.getByRole("row").filter({ hasText: "Grip_0" })).toContainText(/[–≤]/);
+  await expect(page.getByRole("row").filter({ hasText: "Grip 0" })).toContainText(/[–≤]/);
   await open(page, runs.good);
   await page.getByRole("tab", { name: "Facts" }).click();
   await expect(page.locator("dl > div").filter({ hasText: "Took" })).toContainText(/[–≤]/);

@@ -7,7 +7,7 @@ import { errorText } from "../api/http";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";
 import { boundsText } from "../status/durations";
-import { INTO } from "../status/level-places";
+import { INTO, spaced } from "../status/level-places";
 import { runLabel } from "../status/progress";
 import { useSiteChoice } from "../status/site-choice";
 import { toneColor } from "../status/state-label";
@@ -120,8 +120,10 @@ function SpreadBar({ action, most }: { action: ActionStatistics; most: number })
 function ActionWay({ action: { levels, name } }: { action: ActionStatistics }) {
   return (
     <bdi>
-      {levels.length > 0 && <span className="ink3 weight-400">{[...levels, ""].join(INTO)}</span>}
-      {name}
+      {levels.length > 0 && (
+        <span className="ink3 weight-400">{[...levels.map(spaced), ""].join(INTO)}</span>
+      )}
+      {spaced(name)}
     </bdi>
   );
 }
