@@ -100,6 +100,24 @@ test("a run goes on in each hall, and one list has both", async () => {
   expect(ada.failures).toEqual([]);
 });
 
+test("a link to a run of the second hall shows it to somebody without a name", async ({
+  browser,
+}) => {
+  const run = (await runsAt(second.url))[0]?.id ?? "";
+  const init = {
+    method: "POST",
+    body: JSON.stringify({ thing: run, label: "visitor", days: 1 }),
+    headers: { "content-type": "application/json" },
+  };
+  const { path } = await product.ask<{ path: string }>("/api/view-links", init, second.url);
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  await page.goto(product.url + path);
+  await expect(page.getByText("running").first()).toBeVisible();
+  await expect(page.getByText("Dora").first()).toBeVisible();
+  await context.close();
+});
+
 test("STOP ALL stops one hall at once while the other is frozen, which is named", async ({
   browser,
 }) => {

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 from action_assistant.umrf.digest import digest
@@ -66,6 +67,8 @@ def test_the_page_is_told_of_both_and_may_connect_to_both(halls: Halls) -> None:
     for url in (product.runner_url, second.url):
         assert f" {url} " in policy
         assert f" {url.replace('http', 'ws')}" in policy
+    places = httpx.get(f"{product.url}/api/view", trust_env=False).json()
+    assert places["more_runners"] == [second.url]
     with second.client() as client:
         allowed = client.get("/api/robots", headers={"origin": product.url})
     assert allowed.headers["access-control-allow-origin"] == product.url

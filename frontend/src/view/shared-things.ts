@@ -1,7 +1,7 @@
 /** A graph or a run as a link shows it, kept up to date; refused in words when the link ends. */
 import { useEffect, useState } from "react";
 import { editor, runnerAt } from "../api/client";
-import { errorText, fetchAnswer, isFinal } from "../api/http";
+import { errorText, fetchAnswer, isFinal, Refusal } from "../api/http";
 import type { EditorApi } from "../api/schema/editor";
 import type { RunnerApi } from "../api/schema/runner";
 import { tick } from "../clock/server-clock";
@@ -87,8 +87,14 @@ const followGraph: Follow<SharedGraph> = async (viewKey, again, show, signal) =>
 };
 
 const followRun: Follow<SharedRun> = async (viewKey, again, show, signal) => {
-  const { runner_url: runner } = await editor.get("/api/view", { signal });
-  const whole = await runnerAt(runner).get("/api/view/run", { query: { again }, viewKey, signal });
+  const places = await editor.get("/api/view", { signal });
+  const { runner, whole } = await firstWith(
+    [places.runner_url, ...(places.more_runners ?? [])],
+    async (runner) => ({
+      runner,
+      whole: await runnerAt(runner).get("/api/view/run", { query: { again }, viewKey, signal }),
+    }),
+  );
   let shown: SharedRun = { ...whole, seen: null };
   show(shown);
   const url = `${runner}/api/view/run/events`;
@@ -104,6 +110,23 @@ const followRun: Follow<SharedRun> = async (viewKey, again, show, signal) => {
     show(shown);
   }
 };
+
+/** Returns what the first place answers that knows the link: others refuse its key. */
+async function firstWith<T>(
+  places: readonly string[],
+  ask: (place: string) => Promise<T>,
+): Promise<T> {
+  const errors: unknown[] = [];
+  for (const place of places) {
+    try {
+      return await ask(place);
+    } catch (error) {
+      errors.push(error);
+    }
+  }
+  // A place that does not answer may be the one that has it.
+  throw errors.find((error) => !(error instanceof Refusal)) ?? errors[0];
+}
 
 /** Waits for so long, or until the page ends. */
 function pause(ms: number, end: AbortSignal): Promise<void> {

@@ -2654,11 +2654,13 @@ export interface EditorApi {
     /**
      * ViewPlaces
      * @description The address of the runner, without a slash at its end, and the origins of sites that may show
-     *     links in a frame.
+     *     links in a frame. `more_runners`: the addresses of further runners, one of which may have the run of
+     *     the link; absent with one.
      */
     ViewPlaces: {
         runner_url: string;
         frame_origins: string[];
+        more_runners?: string[];
     };
     /**
      * WaitingDevice

@@ -34,10 +34,12 @@ _Asking = Request[Any, Any, Any]
 
 class ViewPlaces(msgspec.Struct, frozen=True):
     """The address of the runner, without a slash at its end, and the origins of sites that may show
-    links in a frame."""
+    links in a frame. `more_runners`: the addresses of further runners, one of which may have the run of
+    the link; absent with one."""
 
     runner_url: str
     frame_origins: list[str]
+    more_runners: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class SharedGraph(msgspec.Struct, frozen=True):
@@ -74,8 +76,10 @@ def routes(
     )
     async def places(request: _Asking) -> ViewPlaces:
         host = request.headers.get("host", "")
-        runner = addresses.runner_at(host, app_state.services.settings.runner_port)
-        return ViewPlaces(runner, list(frames))
+        settings = app_state.services.settings
+        runner = addresses.runner_at(host, settings.runner_port)
+        more = tuple(each.url for each in addresses.sites_at(host, settings.sites)[1:])
+        return ViewPlaces(runner, list(frames), more or msgspec.UNSET)
 
     @get(
         "/api/view/graph",
