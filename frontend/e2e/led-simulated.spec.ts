@@ -302,6 +302,20 @@ test("a step goes into a sub-graph that is opened, and over it", async () => {
     ...([`/api/runs/${repeated?.id}`, {}, product.runnerUrl] as const),
   );
   expect(Object.keys(actions).sort()).toEqual(["Close_0", "Drive_0", "Lift_0", "Reach_0"]);
+
+  await page.goto(`${product.url}/runs/${continued?.id}`);
+  await again("As it went, with the newest version");
+  await expect.poll(async () => (await runs())[0]?.id, soon).not.toBe(repeated?.id);
+  await expect.poll(async () => (await runs())[0]?.state, soon).toBe("finished");
+  const [newest] = await runs();
+  const led = await product.ask<{ engine: string; actions: Record<string, { levels?: string[] }> }>(
+    ...([`/api/runs/${newest?.id}`, {}, product.runnerUrl] as const),
+  );
+  const opened = Object.entries(led.actions).filter(([, { levels }]) => levels !== undefined);
+  expect([led.engine, opened.map(([name]) => name).sort()]).toEqual([
+    "conducted",
+    ["Close_0", "Reach_0"],
+  ]);
 });
 
 test("a dry-run begins at an action, or plays nothing else", async () => {

@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { runnerAt } from "./client";
 import { fetchAnswer, type RequestOptions } from "./http";
 import { getRun } from "./run-stop";
-import type { Run } from "./runs";
+import type { Inside, Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 import { runnerOfRun } from "./sites";
 
@@ -168,9 +168,10 @@ export function recordedScriptFor(
   runner: string,
   run: string,
   umrf: string,
+  subgraphs: Inside["subgraphs"],
   fault?: { action: string; fault: InjectedFault },
 ): Promise<RunnerApi["Recorded"]> {
-  const body = { ...fault, umrf };
+  const body = { ...fault, umrf, ...(subgraphs && { subgraphs }) };
   return runnerAt(runner).post("/api/runs/{run}/script", { path: { run }, body });
 }
 

@@ -16,10 +16,11 @@ import { expectRun } from "../api/courses";
 import { graphMoment, publish, useVersions, type Version, versionName } from "../api/graphs";
 import { errorText, fetchText } from "../api/http";
 import { insideOf } from "../api/inside";
-import { engineWords } from "../api/led-runs";
+import { CONDUCTED, engineWords } from "../api/led-runs";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../api/review";
+import { SIMULATOR } from "../api/robots";
 import { getRun } from "../api/run-stop";
-import { type Inside, type Run, startRun } from "../api/runs";
+import { type Inside, type Run, type StartOrder, startRun } from "../api/runs";
 import { memberText } from "../graph/json-members";
 import { type Beginning, canContinue, isOpened, openedIn } from "../status/earlier-list";
 import { actionWords } from "../status/level-places";
@@ -362,6 +363,14 @@ async function sentGraph(runner: string, run: Run, which: RepeatedVersion): Prom
   return { ...sent, inside: { ...(subgraphs && { subgraphs }) } };
 }
 
+/** Return where a repeated run goes: its newest version is opened again, if the run had opened its own. */
+function wayOf(run: Run, which: RepeatedVersion): Pick<StartOrder, "engines" | "led"> {
+  if (which !== "newest" || !isOpened(run)) return { engines: [SIMULATOR] };
+  const actors = Object.keys(run.robots ?? {});
+  const robots = Object.fromEntries(actors.map((actor) => [actor, SIMULATOR]));
+  return { engines: [CONDUCTED], led: { robots, lost: "stop", levels: "opened" } };
+}
+
 /** Starts it; whatever was not seen is chosen, and told. */
 async function repeatRun(
   runner: string,
@@ -372,13 +381,13 @@ async function repeatRun(
   const sent = await sentGraph(runner, run, which);
   const script =
     which === "newest"
-      ? await recordedScriptFor(runner, run.id, sent.umrf, fault)
+      ? await recordedScriptFor(runner, run.id, sent.umrf, sent.inside?.subgraphs, fault)
       : await recordedScriptOf(runner, run.id, fault);
   const started = await startRun({
     runner,
     ...sent,
     graph: run.graph ?? "",
-    engines: ["simulator"],
+    ...wayOf(run, which),
     request: crypto.getRandomValues(new Uint32Array(4)).join("-"),
     script: { behaviours: script.behaviours },
   });

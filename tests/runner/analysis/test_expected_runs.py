@@ -10,6 +10,7 @@ from action_assistant.runner.analysis.expected_runs import Recorded, fitted, rec
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from runner.analysis.test_compare import PLAN, went
+from runner.execution.test_opened_levels import MIXED, opened
 from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
 
@@ -108,3 +109,26 @@ def test_a_script_for_another_version_is_asked_for_over_http(process: RunnerProc
         assert client.post(path, json={"umrf": 5}).status_code == 422
         assert client.post(path, json={"umrf": newest, "action": "Work_1"}).status_code == 400
         assert client.post(path, json={}).status_code == 400
+
+
+def test_a_run_that_had_opened_its_sub_graphs_fits_the_newest_version_opened_again(
+    process: RunnerProcess,
+) -> None:
+    robots = {"Scout": "simulator", "Carrier": "simulator"}
+    script = {"*": [{"after_s": 0.1}]}
+    behaviours = msgspec.Raw(msgspec.json.encode({"behaviours": script}))
+    request = msgspec.structs.replace(opened(MIXED), script=behaviours, robots=robots)
+    with process.client() as client:
+        run = over(client, started(client, request)["id"])
+        inside = [name for name, each in run["actions"].items() if each.get("levels")]
+        assert len(inside) == 2
+        path = f"/api/runs/{run['id']}/script"
+        body = {"umrf": request.umrf, "subgraphs": request.subgraphs}
+        answer = client.post(path, content=msgspec.json.encode(body))
+        assert answer.is_success, answer.text
+        found = answer.json()
+        assert set(found["behaviours"]) >= set(inside)
+        assert not any("not have" in each["text"] for each in found["doubts"])
+        body = {"umrf": request.umrf}
+        closed = client.post(path, content=msgspec.json.encode(body)).json()
+        assert any("That run did not have it" in each["text"] for each in closed["doubts"])

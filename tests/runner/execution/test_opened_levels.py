@@ -7,14 +7,18 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict
+from action_assistant.runner.analysis import expected_runs
+from action_assistant.runner.analysis.course_checks import check_courses
 from action_assistant.runner.execution.question_commands import AnswerRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.repeats.repeat import NextRequest, RepeatRequest
 from action_assistant.runner.repeats.service import Repeats
 from action_assistant.runner.runs.earlier import StartFrom
+from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.views import run_view, time
 from action_assistant.runner.start.admission import GoOnRequest, StepRequest
 from action_assistant.umrf.breakpoints import Breakpoint
+from action_assistant.umrf.files import codec
 from runner.execution.test_conducted_subgraphs import PICK, TASK, going_on, looking, named, sent
 from runner.execution.test_conductor import Lab, refused, shared
 from runner.execution.test_questions import CONFIRM, line, open_question
@@ -255,3 +259,24 @@ async def test_a_repeat_opens_the_sub_graphs_in_each_of_its_runs() -> None:
             started = await repeats.start(repeat.id, NextRequest(cell), ANN, SIGNED_IN)
             assert await ended(control, started.run.id) == "finished"
         assert [len(lab.david.starts), len(lab.carol.starts)] == [2, 4]
+
+
+@virtual
+async def test_an_opened_run_is_expected_and_repeated_as_it_went_with_what_is_inside() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    async with lab.runner() as control:
+        start = opened(MIXED)
+        run = (await control.start(start, ANN)).run.id
+        await ended(control, run)
+    found, first = lab.harness.journal.history(run), lab.harness.journal.told(run)[0]
+    assert isinstance(first, Requested)
+    saved = expected_runs.of_run(found, first.umrf, "x", ANN, 1, first.subgraphs)
+    now = bytes(start.umrf)
+    (course,) = check_courses([saved], now, subgraphs=start.subgraphs).courses
+    assert (course.same, course.why) == (True, "")
+    other = sent(going_on(TASK), going_on(shared(sequence("Pick", 3), "Scout", "Carrier")))
+    (course,) = check_courses([saved], now, subgraphs=other.subgraphs).courses
+    assert course.same is False
+    graph = codec.read(now).graph
+    closed = expected_runs.fitted(expected_runs.recorded(found), found, graph)
+    assert "Pick_0" in {each.action for each in closed.doubts}

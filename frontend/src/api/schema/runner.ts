@@ -2982,12 +2982,15 @@ export interface RunnerApi {
     /**
      * ScriptRequest
      * @description Another version of the graph of a run; `action` (a name of the run) may have a `fault`.
+     *     `subgraphs`: the graphs inside, for a run that had opened them.
      */
     ScriptRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
         umrf: {
             [key: string]: unknown;
         } | string;
+        /** @default [] */
+        subgraphs?: RunnerApi["SentSubgraph"][];
         /** @default null */
         action?: string | null;
         /** @default null */

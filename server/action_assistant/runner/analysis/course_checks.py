@@ -28,6 +28,7 @@ from action_assistant.umrf.courses.coverage import (
 )
 from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.hierarchy.opening import CannotOpen, opened
 from action_assistant.umrf.json.text import JsonObject
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
@@ -132,11 +133,18 @@ def _checked(
         return unchecked, None
     was = codec.read(saved.umrf.encode()).graph
     script = script_from(msgspec.json.decode(saved.script))
-    check = check_expected(was, saved.course, script, now, inside or graphs_in(saved.subgraphs))
+    inside = inside or graphs_in(saved.subgraphs)
+    if saved.opened:
+        try:
+            now = opened(now, inside).graph
+        except CannotOpen as why:
+            return msgspec.structs.replace(unchecked, same=False, why=str(why)), None
+    check = check_expected(was, saved.course, script, now, inside)
     same = check.apart is None
-    arrows = tuple(sorted(check.taken.arrows))
+    arrows = tuple(sorted(check.taken.arrows)) if not saved.opened else ()
     course = msgspec.structs.replace(unchecked, same=same, why=check.why, taken=arrows)
-    return course, check.taken if same else None
+    # The arrows of an opened graph are others than those that people see.
+    return course, check.taken if same and not saved.opened else None
 
 
 def propose(

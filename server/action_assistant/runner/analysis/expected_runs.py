@@ -85,7 +85,8 @@ class Recorded(msgspec.Struct, frozen=True):
 
 
 class Expected(msgspec.Struct, frozen=True, kw_only=True):
-    """The event of an expectation: a graph with this script is to take this course from now on."""
+    """The event of an expectation: a graph with this script is to take this course from now on. `opened`:
+    with its sub-graphs opened, as in the run; `umrf` is the opened graph then."""
 
     kind: ClassVar[str] = "expectation.saved.v1"
 
@@ -99,6 +100,7 @@ class Expected(msgspec.Struct, frozen=True, kw_only=True):
     script: str
     course: tuple[ExpectedStep, ...]
     subgraphs: tuple[RunSubgraph, ...] = ()
+    opened: bool = False
 
 
 class Retired(msgspec.Struct, frozen=True):
@@ -280,7 +282,13 @@ def of_run(
         script=msgspec.json.encode(script).decode(),
         course=course,
         subgraphs=subgraphs,
+        opened=has_opened(found),
     )
+
+
+def has_opened(run: Run) -> bool:
+    """Return whether a run was led with its sub-graphs opened."""
+    return any(action.levels for action in run.actions.values())
 
 
 def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:

@@ -28,7 +28,7 @@ from action_assistant.runner.review.incident import IncidentRequest, window
 from action_assistant.runner.review.service import NoteText, RunMarks
 from action_assistant.runner.review.stored_runs import CauseShown, Format, RunNote, StoredRuns
 from action_assistant.runner.review.worker_queries import WorkerQueries
-from action_assistant.runner.runs.sent_graphs import SentGraph
+from action_assistant.runner.runs.sent_graphs import SentGraph, SentSubgraph
 from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.web.audit.rows import AuditFilter
@@ -54,9 +54,11 @@ def json_of(text: bytes, _: type[T]) -> Response[T]:
 
 
 class ScriptRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Another version of the graph of a run; `action` (a name of the run) may have a `fault`."""
+    """Another version of the graph of a run; `action` (a name of the run) may have a `fault`.
+    `subgraphs`: the graphs inside, for a run that had opened them."""
 
     umrf: SentGraph
+    subgraphs: tuple[SentSubgraph, ...] = ()
     action: str | None = None
     fault: expected_runs.Fault | None = None
 
@@ -191,7 +193,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
             wanted = decoded(body, ScriptRequest)
             fault = _fault(wanted.action, wanted.fault)
             text = await services.worker_queries.text(
-                StoredRuns.script, run, fault, bytes(wanted.umrf)
+                StoredRuns.script, run, fault, bytes(wanted.umrf), wanted.subgraphs
             )
         return json_of(text, expected_runs.Recorded)
 

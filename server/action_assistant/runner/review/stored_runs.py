@@ -33,7 +33,13 @@ from action_assistant.runner.runs.events import Author, Observed, decode, said_i
 from action_assistant.runner.runs.history import RunHistory, whole_of
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_sent, sent_of
+from action_assistant.runner.runs.sent_graphs import (
+    Sent,
+    SentSubgraph,
+    read_inside,
+    read_sent,
+    sent_of,
+)
 from action_assistant.runner.runs.shared_view import SharedRun, shared_run
 from action_assistant.runner.runs.sight import RunGraphs, Unseen, graphs_requested
 from action_assistant.schema.runner_tables import (
@@ -45,6 +51,7 @@ from action_assistant.schema.runner_tables import (
     runner_written_by,
 )
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.hierarchy.opening import CannotOpen, opened
 from action_assistant.umrf.model import Graph
 from action_assistant.web.auth.caller import without_origin
 
@@ -414,20 +421,30 @@ class StoredRuns:
         return await self._journal.pieces(run_id)
 
     async def script(
-        self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
+        self,
+        run_id: str,
+        fault: tuple[str, expected_runs.Fault] | None,
+        umrf: bytes | None = None,
+        subgraphs: Sequence[SentSubgraph] = (),
     ) -> expected_runs.Recorded:
         """Return the run as a script, for its own graph or for another version of it (`umrf`: the
-        text, None for its own). `fault`: an action and the fault with which its last visit ends
-        instead. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad fault or
-        graph."""
+        text, None for its own; `subgraphs`: the graphs inside, which are opened if the run had opened
+        them). `fault`: an action and the fault with which its last visit ends instead. Raise NotFound
+        for an unknown run; BadInput, NotUmrf or TooLarge for a bad fault or graph, Conflict for one
+        that cannot be opened."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
             raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
         script = expected_runs.recorded(found, fault)
         if umrf is None:
             return script
-        _, reading = read_sent(umrf)
-        return expected_runs.fitted(script, found, reading.graph)
+        graph = read_sent(umrf)[1].graph
+        if subgraphs and expected_runs.has_opened(found):
+            try:
+                graph = opened(graph, read_inside(subgraphs, "", None, approved=False)[1]).graph
+            except CannotOpen as why:
+                raise Conflict(str(why), where={"path": "/umrf"}) from why
+        return expected_runs.fitted(script, found, graph)
 
     # --- many runs ----------------------------------------------------------------------------
 
