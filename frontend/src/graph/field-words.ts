@@ -48,15 +48,6 @@ export function spokenName(fullName: string): string {
   return number === "0" ? shownName(own) || "an action" : `${shownName(own)} ${number}`;
 }
 
-/** Replace the full names of actions (`known`) in a text by those that people say. */
-export function spokenText(
-  text: string,
-  known: ReadonlySet<string>,
-  spoken: (fullName: string) => string = spokenName,
-): string {
-  return text.replace(/\b\w+_\d+\b/g, (word) => (known.has(word) ? spoken(word) : word));
-}
-
 /** Return the name of the entry or the exit; null for an action. */
 export function endLabel(key: Key): "Entry" | "Exit" | null {
   return key === "entry" ? "Entry" : key === "exit" ? "Exit" : null;

@@ -7,7 +7,7 @@ import { engineWords } from "../api/led-runs";
 import type { ComparedField, ComparedStep, Comparison } from "../api/review";
 import type { Visit } from "../api/runs";
 import { plainValue } from "../differences/difference-words";
-import { spokenText } from "../graph/field-words";
+import { spokenText } from "../graph/spoken-text";
 import { boundsText } from "../status/durations";
 import { INTO, spaced, wayWords } from "../status/level-places";
 import { visitDuration } from "../status/progress";

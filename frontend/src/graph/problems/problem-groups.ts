@@ -1,9 +1,10 @@
 /** Groups checked problems for people: one thing is shown once, however many fields it has. Pure. */
 
-import { pathWords, spokenText } from "../field-words";
+import { pathWords } from "../field-words";
 import { type Action, fullName, type Graph, type Key } from "../model";
 import { type DataFlow, dataFlowOf, readValue } from "../parameters/data-flow";
 import { groupOf } from "../parameters/groups";
+import { spokenText } from "../spoken-text";
 import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
 
 export interface ProblemGroup<P extends CheckedProblem = CheckedProblem> {
