@@ -6,7 +6,7 @@ import { addAction, connect, setEntry, setExit, setResponse } from "../graph/edi
 import { writeNote } from "../graph/edit/notes";
 import { type Graph, PRECONDITIONS } from "../graph/model";
 import { readGraph } from "../graph/read";
-import { bundlesOf, inOrder, leadingNowhere, type OutlineItem, rowsOf } from "./rows";
+import { bundlesOf, inOrder, leadingNowhere, namesOf, type OutlineItem, rowsOf } from "./rows";
 
 const read = (doc: Y.Doc) => readGraph(mapsOf(doc));
 const all = () => true;
@@ -169,4 +169,11 @@ test("every outcome that is answered is in exactly one bundle", () => {
       expect(new Set(bundles.map(({ id }) => id)).size).toBe(bundles.length);
     }),
   );
+});
+
+test("rows of a phone call ready-made actions as their cards do", () => {
+  const doc = new Y.Doc();
+  for (const name of ["AaConfirm", "Grip", "Grip"]) addAction(doc, { name });
+  const names = [...namesOf(read(doc)).values()];
+  expect(names).toEqual(["Entry", "Exit", "Confirm", "Grip 0", "Grip 1"]);
 });

@@ -13,6 +13,7 @@ import {
   type Relation,
   type Response,
 } from "../graph/model";
+import { shownName } from "../graph/questions";
 
 interface OutlinePosition {
   readonly id: string;
@@ -242,7 +243,7 @@ export function namesOf(graph: Graph): ReadonlyMap<Key, string> {
   for (const { name } of graph.actions) counts.set(name, (counts.get(name) ?? 0) + 1);
   const names = graph.actions.map(({ key, name, instanceId }): [Key, string] => [
     key,
-    (counts.get(name) ?? 0) > 1 ? `${name} ${instanceId}` : name,
+    (counts.get(name) ?? 0) > 1 ? `${shownName(name)} ${instanceId}` : shownName(name),
   ]);
   return new Map([[ENTRY, "Entry"], [EXIT, "Exit"], ...names]);
 }
