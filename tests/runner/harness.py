@@ -315,10 +315,10 @@ class Robot:
         if self.silent or self.chance.random() < self.loss:
             await anyio.sleep_forever()
         answer = await self.engine.get()
+        graphs = self.engine._engine.graphs  # now: another one may have taken its place later
+        texts = {each.graph: codec.write(graphs[each.graph].graph) for each in answer.graphs}
         await arrives_after(self.chance.random() * self.old)
         shown = tuple(self._blinded(each, answer) for each in answer.graphs)
-        graphs = self.engine._engine.graphs
-        texts = {each.graph: codec.write(graphs[each.graph].graph) for each in shown}
         known = self.known_graphs
         return msgspec.structs.replace(answer, graphs=shown, texts=texts, known_graphs=known)
 

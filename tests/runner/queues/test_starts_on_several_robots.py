@@ -13,16 +13,22 @@ from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.runner.execution.start_pipeline import Grouped
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.queues.entry import (
+    Looked,
     MoveRequest,
     QueueRequest,
+    QueueStartKept,
     TurnRequest,
     Waiting,
+    entered_of,
     request_of,
+    stream_of,
     waits_of,
 )
 from action_assistant.runner.queues.robot_queue import Entry
 from action_assistant.runner.queues.service import Queues
+from action_assistant.runner.runs.events import draft_of
 from action_assistant.runner.start.approvals import ApprovalRequest
+from action_assistant.runner.start.kept_starts import text_of
 from runner.harness import clock_us, order, sequence, until, virtual
 from runner.queues.test_queues import (
     Lab,
@@ -239,3 +245,49 @@ def test_however_they_are_moved_somebody_has_a_turn_and_no_robot_two_at_once(
         before = len(left)
         left = [names for names, why in zip(left, waits, strict=True) if why]
         assert len(left) < before
+
+
+CAST = {"a": "David", "b": "Carol"}
+
+
+@virtual
+async def test_a_cast_without_a_led_run_gets_into_no_queue_and_onto_no_robot() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        for engine in ("simulator", "Ed", "David"):
+            start = order(sequence(), engine=engine, robots=CAST)
+            with pytest.raises(BadInput, match="Only a led run has several robots"):
+                await control.start(start, author(ANN), ANN)
+            for engines in {(), ("David", "Carol") if engine == "David" else ()}:
+                with pytest.raises(BadInput, match="Only a led run has several robots") as refused:
+                    await put(queues, QueueRequest(start=start, engines=engines))
+                assert refused.value.where == {"path": "/start/robots"}
+        for name, wrong in {
+            "people": order(sequence(), engine="David", people={"a": ""}),
+            "like": order(sequence(), engine="David", like="Carol"),
+            "script": order(sequence(), engine="David", script={"*": []}),
+        }.items():
+            with pytest.raises(BadInput) as refused:
+                await put(queues, QueueRequest(start=wrong, engines=("David", "Carol")))
+            assert refused.value.where == {"path": f"/start/{name}"}
+        assert (queues.entries, lab.david.starts, lab.carol.starts) == ((), [], [])
+
+
+@virtual
+async def test_a_stored_entry_with_a_cast_is_no_start_on_several_robots() -> None:
+    lab = Lab()
+    start = order(sequence(), engine="simulator", robots=CAST)
+    request, seen = QueueRequest(start=start), Looked({})
+    entered = entered_of(request, author(ANN), clock_us(), "task", seen, unsighted=False)
+    drafts = [draft_of(entered), draft_of(QueueStartKept(text_of(start)))]
+    await lab.harness.journal.append(stream_of(entered.entry), drafts)  # as the version before did
+    async with lab.runner() as (_, queues):
+        (kept,) = queues.entries
+        assert (kept.entered.robots, kept.entered.together) == (("Carol", "David"), ())
+        with pytest.raises(Conflict, match="remove it: Only a led run has several robots"):
+            await queues.look(kept.id, {}, ANN)
+        for robot in ("Carol", "David"):
+            with pytest.raises(Conflict, match="remove it"):
+                await reopened(queues, robot)
+        await queues.remove(kept.id, author(ANN), ANN)
+        assert (queues.entries, lab.david.starts, lab.carol.starts) == ((), [], [])

@@ -19,7 +19,7 @@ from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.start.admission import StartRequest, Watching
-from action_assistant.runner.start.kept_starts import ordered_in, start_of
+from action_assistant.runner.start.kept_starts import ordered_in, require_form, start_of
 from action_assistant.runner.start.orders import engines_of
 from action_assistant.runner.start.preflight import Item, Preflight
 from action_assistant.umrf.start_values import StartValues
@@ -56,7 +56,12 @@ class QueueRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     @property
     def robots(self) -> tuple[str, ...]:
         """The robots for which it waits, sorted."""
-        return tuple(sorted(set(self.engines))) or engines_of(self.start)
+        return self.each_whole or engines_of(self.start)
+
+    @property
+    def each_whole(self) -> tuple[str, ...]:
+        """The robots of a start on several robots, sorted; none for any other start."""
+        return tuple(sorted(set(self.engines)))
 
 
 class LookRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -97,8 +102,9 @@ class Looked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class QueueEntered(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A person put a start into the queue; nothing was started by it. `robots`: those that it waits for,
-    none for one in the simulator; `order`: the hash of all that was ordered; `seen`: the look of its
-    person; `inside`, `unsighted`: as of a run."""
+    none for one in the simulator; `engines`: those of a start on several robots, sorted, none for any
+    other; `order`: the hash of all that was ordered; `seen`: the look of its person; `inside`,
+    `unsighted`: as of a run."""
 
     kind: ClassVar[str] = "queue.entered.v1"
 
@@ -114,6 +120,7 @@ class QueueEntered(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True
     engine: str
     robots: tuple[str, ...]
     seen: Looked
+    engines: tuple[str, ...] = ()
     values: StartValues = {}
     by_itself: bool = False
     inside: tuple[str, ...] = ()
@@ -121,8 +128,9 @@ class QueueEntered(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True
 
     @property
     def together(self) -> tuple[str, ...]:
-        """The robots of a start on several robots; none for any other start, as for that of a led run."""
-        return self.robots if self.engine != CONDUCTED and len(self.robots) > 1 else ()
+        """The robots that get the whole graph together; none for a start on one, or that of a led run. Only
+        what was asked for says that: a cast names robots, too."""
+        return self.engines if len(self.engines) > 1 else ()
 
     @property
     def requests(self) -> tuple[str, ...]:
@@ -265,6 +273,7 @@ def require_queueable(request: QueueRequest) -> None:
         where: dict[str, object] = {"path": "/start/drill" if start.drill else "/start/from"}
         text = "A Stop drill, and a start that takes outcomes of an earlier run, cannot wait."
         raise BadInput(text, where=where)
+    require_form(start)
     if start.watching:
         text = "A person says that they watch when it starts, not when it is put into the queue."
         raise BadInput(text, where={"path": "/start/watching"})
@@ -276,6 +285,18 @@ def require_queueable(request: QueueRequest) -> None:
     if request.by_itself and (request.robots or start.behaviours):
         text = "A person starts whatever may move something: by itself a start goes in the simulator alone."
         raise BadInput(text, where={"path": "/by_itself"})
+
+
+def require_as_asked(entered: QueueEntered, start: StartRequest) -> None:
+    """Raise Conflict unless the stored `start` of an entry may wait, and is for its robots: an earlier
+    version took others, too."""
+    request = QueueRequest(start=start, by_itself=entered.by_itself, engines=entered.engines)
+    try:
+        require_queueable(request)
+    except BadInput as why:
+        raise Conflict(f"This cannot be started, remove it: {why.detail}") from why
+    if request.robots != entered.robots:
+        raise Conflict("This cannot be started, remove it: its start is for other robots.")
 
 
 def entered_of(
@@ -296,6 +317,7 @@ def entered_of(
         engine=start.engine,
         robots=request.robots,
         seen=seen,
+        engines=request.each_whole,
         values=start.values,
         by_itself=request.by_itself,
         inside=tuple(each.graph for each in start.subgraphs if each.graph)

@@ -23,7 +23,7 @@ from action_assistant.runner.execution.doubts import DoubtWatch
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.execution.start_pipeline import Grouped, Started
-from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
+from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.queues.entry import (
     MOST,
     MOST_OF_ONE,
@@ -51,6 +51,7 @@ from action_assistant.runner.queues.entry import (
     order_of,
     queue_names_of,
     request_of,
+    require_as_asked,
     require_openable,
     require_queueable,
     require_waitable,
@@ -177,20 +178,21 @@ class Queues:
 
     async def _start_in(self, entry: Entry, watching: Watching) -> StartRequest:
         """Return the one start of an entry. Raise BadInput if a person watches a robot that does not
-        move, Unavailable if it cannot be read."""
+        move, Conflict for what cannot be started, Unavailable if it cannot be read."""
         watched_in(watching, entry.entered.robots)
         start = kept_in(await self._journal.read(stream_of(entry.id)))
+        require_as_asked(entry.entered, start)
         return msgspec.structs.replace(start, request_id=request_of(entry.id), watching=watching)
 
     async def _look(
         self,
         start: StartRequest,
         robots: tuple[str, ...],
+        engines: tuple[str, ...],
         seen: Looked,
         identity: Identity,
         turn: InQueue | None = None,
     ) -> tuple[Look, Looked]:
-        engines = () if start.engine == CONDUCTED else robots
         group = group_of(start, engines)
         looks = await self._control.look(group, identity.person.id, identity, turn)
         of = self._control.rights.of
@@ -202,8 +204,8 @@ class Queues:
     async def _look_at(
         self, entry: Entry, start: StartRequest, identity: Identity, turn: InQueue | None = None
     ) -> Look:
-        robots, seen = entry.entered.robots, entry.entered.seen
-        return (await self._look(start, robots, seen, identity, turn))[0]
+        of = entry.entered
+        return (await self._look(start, of.robots, of.engines, of.seen, identity, turn))[0]
 
     async def look(self, id_: str, watching: Watching, identity: Identity) -> Look:
         """Return the pre-flight of an entry as it is now for a person. Raise NotFound if it does not
@@ -235,7 +237,8 @@ class Queues:
                 return known, False
             self._require_capacity(author)
             graph = await self._run_in_worker(graph_of, start)
-            look, seen = await self._look(start, robots, Looked({}), identity)
+            engines = request.each_whole
+            look, seen = await self._look(start, robots, engines, Looked({}), identity)
             require_waitable(start, look.looks)
             unsighted = start.sight is None and self._control.sight.has_rules
             now = self._clock_us()

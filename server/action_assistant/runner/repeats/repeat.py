@@ -155,11 +155,6 @@ def stream_of(repeat: str) -> str:
     return f"{_PREFIX}{repeat}"
 
 
-def is_of_repeat(stream: str) -> bool:
-    """Return whether a stream is that of a repeat."""
-    return stream.startswith(_PREFIX)
-
-
 def follow(repeat: Repeat | None, event: RepeatEvent) -> Repeat | None:
     """Return a repeat after one more event; None before it was opened."""
     if isinstance(event, RepeatOpened):

@@ -46,7 +46,7 @@ from action_assistant.runner.runs.events import Author, PartOfRepeat, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest, Watching
-from action_assistant.runner.start.kept_starts import group_of, text_of
+from action_assistant.runner.start.kept_starts import group_of, require_form, text_of
 from action_assistant.runner.start.orders import InRepeat, engines_of, watched_in
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.web.auth.caller import BackgroundTasks
@@ -193,6 +193,7 @@ class Repeats:
         if start.drill or start.start_from is not None:
             where: dict[str, object] = {"path": "/start/drill" if start.drill else "/start/from"}
             raise BadInput("A repeat begins at the entry, and is no Stop drill.", where=where)
+        require_form(start)
         if request.by_itself and robots:
             text = (
                 "On robots a person starts each run: a repeat goes on by itself in the simulator."

@@ -1,5 +1,4 @@
-"""The requests of starts, and the rules that a start has to satisfy before it is stored or sent.
-Pure."""
+"""The requests of starts, and the rules that a start has to satisfy before it is stored or sent. Pure."""
 
 import itertools
 import re
@@ -405,9 +404,9 @@ def admit(
         *(reading.placed(found_problems) if is_whole else found_problems),
     ]
     if request.engine != CONDUCTED and any(map(is_asked, graph.actions)):
-        require_nobody_asked(graph, request.engine, _script(request)[0])
+        require_nobody_asked(graph, request.engine, script_of(request)[0])
     _check_problems(problems, request.override)
-    script, script_text = _script(request)
+    script, script_text = script_of(request)
     return Admitted(
         graph=graph,
         graph_id=request.graph or stamp.graph,
@@ -544,7 +543,8 @@ def _check_problems(problems: Sequence[Problem], override: Override | None) -> N
     )
 
 
-def _script(request: StartRequest) -> tuple[Script, str]:
+def script_of(request: StartRequest) -> tuple[Script, str]:
+    """Return the script of a start, and its text. Raise BadInput, with the place, for a wrong one."""
     raw = bytes(request.script).strip()
     if raw in {b"", b"null"}:
         return Script({}), ""

@@ -4,9 +4,12 @@ from typing import Any
 
 import msgspec
 
-from action_assistant.errors import Conflict
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.runs.sent_graphs import read_sent
-from action_assistant.runner.start.admission import GroupRequest, StartRequest
+from action_assistant.runner.start.admission import GroupRequest, StartRequest, script_of
+from action_assistant.runner.start.casting import require_not_led
+from action_assistant.runner.start.orders import require_plain
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.model import Graph
 
@@ -49,6 +52,21 @@ def graph_of(start: StartRequest) -> Graph:
             where={"path": "/start/digest"},
         )
     return reading.graph
+
+
+def require_form(start: StartRequest) -> None:
+    """Raise BadInput, as a start at once does, for fields that mean nothing on the engine of a start."""
+    try:
+        if start.engine != CONDUCTED:
+            require_not_led(start.robots, start.people)
+        if start.engine != SIMULATOR:
+            require_plain(start)
+        script_of(start)
+    except BadInput as why:
+        where = why.where or {}
+        raise BadInput(
+            why.detail, where=where | {"path": f"/start{where.get('path', '')}"}
+        ) from why
 
 
 def group_of(start: StartRequest, engines: tuple[str, ...] = ()) -> GroupRequest:
