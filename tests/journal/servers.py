@@ -44,10 +44,8 @@ class Server:
         self._home = folder
         self._databases = 0
         self._data = folder / "data"
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.port: int = free.getsockname()[1]
-        self._run("initdb", "-D", str(self._data), "-U", "aa", "-A", "trust", "-E", "UTF8",
+        self.port: int = _free_port()
+        self.run("initdb", "-D", str(self._data), "-U", "aa", "-A", "trust", "-E", "UTF8",
                   "--locale=C", "--no-instructions", "--no-sync")  # fmt: skip
         lines = "".join(f"{name} = '{value}'\n" for name, value in _SETTINGS.items())
         with (self._data / "postgresql.conf").open("a") as file:
@@ -77,9 +75,13 @@ class Server:
         first = psutil.Process(int(number))
         return [first, *first.children(recursive=True)]
 
+    def ask(self, text: str, database: str = "postgres") -> str:
+        """Return what SQL answers."""
+        return _answer(self._bin, self.port, text, database)
+
     def sql(self, text: str, database: str = "postgres") -> None:
         """Run SQL as the owner."""
-        self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
+        self.run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
                   "-U", "aa", "-d", database, "-c", text)  # fmt: skip
 
     @property
@@ -95,7 +97,7 @@ class Server:
     def load(self, dump: Path) -> str:
         """The URL of a new database with what a dump holds."""
         url = self.new_database()
-        self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
+        self.run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
                   "-U", "aa", "-d", url.rpartition("/")[2], "-f", str(dump))  # fmt: skip
         return url
 
@@ -106,9 +108,10 @@ class Server:
         self._ctl("reload")
 
     def _ctl(self, command: str, *options: str) -> None:
-        self._run("pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options)
+        self.run("pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options)
 
-    def _run(self, program: str, *arguments: str) -> None:
+    def run(self, program: str, *arguments: str) -> None:
+        """Run a program of Postgres as the user of this server."""
         user = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
         subprocess.run(
             [str(self._bin / program), *arguments],
@@ -120,6 +123,68 @@ class Server:
             timeout=90,
             **user,  # type: ignore[call-overload]
         )
+
+
+class Replica:
+    """A server that copies another one, and can take over from it."""
+
+    def __init__(self, primary: Server) -> None:
+        self._primary = primary
+        self._data = primary.home / "replica"
+        self.port: int = _free_port()
+        primary.run("pg_basebackup", "-D", str(self._data), "-R", "-h", "127.0.0.1",
+                    "-p", str(primary.port), "-U", "aa", "-c", "fast")  # fmt: skip
+        with (self._data / "postgresql.conf").open("a") as file:
+            file.write(f"port = {self.port}\n")
+        self._ctl("start", "-l", str(primary.home / "replica.log"))
+
+    def ask(self, text: str, database: str = "postgres") -> str:
+        """Return what SQL answers."""
+        return _answer(self._primary.binaries, self.port, text, database)
+
+    def promote(self) -> None:
+        """Let it take over."""
+        self._ctl("promote")
+
+    def freeze(self) -> None:
+        """Freeze all its processes."""
+        for each in self._processes():
+            each.suspend()
+
+    def thaw(self) -> None:
+        """Let all its processes go on."""
+        for each in self._processes():
+            each.resume()
+
+    def stop(self) -> None:
+        """Stop it at once."""
+        self.thaw()
+        self._ctl("stop", "-m", "immediate")
+
+    def _processes(self) -> list[psutil.Process]:
+        number = (self._data / "postmaster.pid").read_text().splitlines()[0]
+        first = psutil.Process(int(number))
+        return [first, *first.children(recursive=True)]
+
+    def _ctl(self, command: str, *options: str) -> None:
+        self._primary.run(
+            "pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options
+        )
+
+
+def _answer(bin_: Path, port: int, text: str, database: str) -> str:
+    return subprocess.run(
+        [str(bin_ / "psql"), "-qAt", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(port),
+         "-U", "aa", "-d", database, "-c", text],
+        check=True, capture_output=True, text=True, timeout=60,
+    ).stdout.strip()  # fmt: skip
+
+
+def _free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port: int = free.getsockname()[1]
+        return port
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """A database whose servers take over from each other: who is asked, and what proves it safe."""
 
 import asyncio
+import contextlib
 import json
 import socket
 import threading
@@ -9,35 +10,38 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, Unavailable
+from action_assistant.journal import failover
 from action_assistant.journal.databases import database_of
-from action_assistant.journal.failover import Failover
-from journal.servers import Server
-from journal.test_postgres import opened
+from action_assistant.journal.failover import Failover, Primary
+from journal.servers import Replica, Server, binaries, server
+from journal.test_postgres import draft, opened
 
 NOBODY = "127.0.0.1:1"  # where nothing listens
 
 
 class Patroni(BaseHTTPRequestHandler):
-    """Answers as Patroni 3.0.2 does, for the settings of its server."""
+    """Answers as Patroni 3.0.2 does."""
 
     def do_GET(self) -> None:
-        """Answer with the identifier of the cluster, or with its settings."""
-        content = {"database_system_identifier": "42"} if self.path == "/patroni" else SETTINGS
+        """Answer with the state of the server, or with the settings of the cluster."""
         self.send_response(200)
         self.end_headers()
-        self.wfile.write(json.dumps(content).encode())
+        self.wfile.write(json.dumps(STATE if self.path == "/patroni" else SETTINGS).encode())
 
     def log_message(self, *_: object) -> None:
         """Say nothing."""
 
 
+STATE: dict[str, object] = {}
 SETTINGS: dict[str, object] = {}
 
 
 @pytest.fixture
 def patroni() -> Iterator[str]:
     """The address of something that answers as Patroni does."""
+    STATE.update(database_system_identifier="42", role="primary", timeline=3)
+    SETTINGS.update(synchronous_mode=True)
     with HTTPServer(("127.0.0.1", 0), Patroni) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://127.0.0.1:{server.server_port}"
@@ -45,33 +49,109 @@ def patroni() -> Iterator[str]:
 
 
 @pytest.mark.parametrize(
-    ("mode", "identifier", "says"),
+    ("mode", "identifier", "timeline", "says"),
     [
-        (True, "42", ""),
-        ("quorum", "42", ""),
+        (True, "42", 3, ""),
+        ("quorum", "42", 4, ""),
         (
             False,
             "42",
+            3,
             "a failover could lose what it confirms (synchronous_mode of Patroni is off)",
         ),
-        (None, "42", "a failover could lose what it confirms (synchronous_mode of Patroni is off)"),
-        (True, "7", "leads another cluster"),
+        (
+            None,
+            "42",
+            3,
+            "a failover could lose what it confirms (synchronous_mode of Patroni is off)",
+        ),
+        (True, "7", 3, "leads another cluster"),
+        (True, "42", 2, "another server has taken over from it"),
     ],
 )
 async def test_what_patroni_says_decides(
-    patroni: str, mode: object, identifier: str, says: str
+    patroni: str, mode: object, identifier: str, timeline: int, says: str
 ) -> None:
     SETTINGS["synchronous_mode"] = mode
     for standbys in ("", "two"):
-        found = await Failover((f"http://{NOBODY}", patroni)).weakness(standbys, identifier)
+        primary = Primary(standbys, identifier, timeline)
+        found = await Failover((f"http://{NOBODY}", patroni)).weakness(primary)
         assert says in found
         assert (found == "") == (says == "")
 
 
 async def test_without_an_answer_of_patroni_the_primary_itself_must_wait_for_a_replica() -> None:
     silent = Failover((f"http://{NOBODY}",))
-    assert await silent.weakness("two", "42") == ""
-    assert await silent.weakness("", "42") == f"Patroni does not answer at http://{NOBODY}"
+    assert await silent.weakness(Primary("two", "42", 1)) == ""
+    assert (
+        await silent.weakness(Primary("", "42", 1)) == f"Patroni does not answer at http://{NOBODY}"
+    )
+
+
+@pytest.fixture
+def replicated() -> Iterator[tuple[Server, Replica]]:
+    """A server, and a replica that its commits wait for."""
+    if binaries() is None:
+        pytest.skip("Postgres is not installed (Debian: postgresql)")
+    with server() as primary:
+        primary.sql("CREATE DATABASE aa")
+        replica = Replica(primary)
+        try:
+            primary.sql("ALTER SYSTEM SET synchronous_standby_names = '*'")
+            primary.sql("SELECT pg_reload_conf()")
+            yield primary, replica
+        finally:
+            replica.stop()
+
+
+async def test_a_commit_whose_wait_for_the_replica_was_cancelled_is_not_acknowledged(
+    replicated: tuple[Server, Replica],
+) -> None:
+    """Postgres answers it with success and a warning."""
+    primary, replica = replicated
+    journal = await opened(f"{primary.url('aa')}?failover=synchronous")
+    await journal.append("a", [draft("both have it")])
+    replica.freeze()
+    waiting = asyncio.create_task(journal.append("a", [draft("one has it")]))
+    await asyncio.sleep(0.5)
+    primary.sql("SELECT pg_cancel_backend(pid) FROM pg_stat_activity WHERE wait_event = 'SyncRep'")
+    await asyncio.sleep(1)
+    assert not waiting.done()
+    replica.thaw()
+    assert await waiting == 2
+    assert await journal.verify() == []
+    await journal.close()
+
+
+async def test_writer_and_readers_leave_an_old_primary_that_lives_on(
+    replicated: tuple[Server, Replica], patroni: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody promotes the replica by force, while the old primary still confirms commits alone."""
+    monkeypatch.setattr(failover, "_WATCH_S", 0.2)
+    primary, replica = replicated
+    STATE.update(
+        database_system_identifier=primary.ask("SELECT system_identifier FROM pg_control_system()"),
+        timeline=1,
+    )
+    url = f"postgresql://aa@/aa?host=127.0.0.1:{primary.port}&host=127.0.0.1:{replica.port}&patroni={patroni}"
+    journal = await opened(url)
+    await journal.append("a", [draft("both have it")])
+    assert len(await journal.read("a")) == 1  # a reader is connected to the old primary
+    primary.sql("ALTER SYSTEM RESET synchronous_standby_names")
+    primary.sql("SELECT pg_reload_conf()")
+    replica.promote()
+    STATE["timeline"] = 2
+    await asyncio.sleep(1)
+    async with asyncio.timeout(20):
+        while True:
+            with contextlib.suppress(Unavailable):
+                await journal.append("a", [draft("the new one has it")])
+                break
+            await asyncio.sleep(0.1)
+    bodies = [each.body for each in await journal.read("a")]
+    assert bodies == [b"both have it", b"the new one has it"]
+    assert replica.ask("SELECT count(*) FROM event", "aa") == "2"
+    await journal.close()
 
 
 @pytest.mark.parametrize("query", ["failover=synchronous", f"host={NOBODY}"])

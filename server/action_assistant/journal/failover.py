@@ -6,6 +6,7 @@ database says who takes over: several `host`s, `patroni=http://db1:8008` for eac
 """
 
 import asyncio
+import threading
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
@@ -22,36 +23,78 @@ _PATRONI: Final = "patroni"
 _FAILOVER: Final = "failover"
 _SYNCHRONOUS: Final = "synchronous"
 _PATRONI_S: Final = 2.0  # seconds to wait for an answer of Patroni
+_WATCH_S: Final = 5.0  # seconds between two questions about a connection
+_GRACE_S: Final = 0.3  # seconds for a second primary to answer
+#: The timeline of a primary; `pg_control_checkpoint` says it later.
+TIMELINE: Final = "SELECT ('x' || left(pg_walfile_name(pg_current_wal_lsn()), 8))::bit(32)::int"
 
 
 class NoPrimary(OSError):
     """Raised if no server of a database takes commits."""
 
 
+class Primary(NamedTuple):
+    """The facts that a primary tells about itself. `standbys`: its setting `synchronous_standby_names`; `identifier`:
+    of its cluster; `timeline`: rises with each server that takes over."""
+
+    standbys: str
+    identifier: str
+    timeline: int
+
+
 class Failover(NamedTuple):
     """The way in which one server of a database takes over from another. `patroni`: the addresses of
-    Patroni; without any, another manager promotes only a server in `synchronous_standby_names`."""
+    Patroni; without any, another manager promotes only a server that has every confirmed commit."""
 
     patroni: tuple[str, ...]
 
-    async def weakness(self, standbys: str, identifier: str) -> str:
-        """Return why a failover could lose confirmed commits, as a sentence without a full stop; ""
-        if it cannot. `standbys`: the setting `synchronous_standby_names` of the primary, `identifier`:
-        the identifier of its system."""
-        if not self.patroni:
-            return (
-                ""
-                if standbys
-                else "a failover could lose what it confirms (synchronous_standby_names is empty)"
-            )
-        found = await asyncio.gather(*(_asked(each, identifier) for each in self.patroni))
-        if _SYNCHRONOUS in found:
-            return ""  # while it has no replica, Patroni promotes none
-        # Only a primary whose Patroni led it into synchronous mode waits for a replica.
-        if standbys and not any(found):
+    async def weakness(self, primary: Primary) -> str:
+        """Return why what this primary confirms could be lost, as a sentence without a full stop; ""
+        if it cannot."""
+        if self.patroni and (said := await self.said(primary)) is not None:
+            return said
+        # A primary that its Patroni led into synchronous mode names a replica, and waits for it.
+        if primary.standbys:
             return ""
-        faults = dict.fromkeys(each for each in found if each)
-        return " and ".join(faults) or f"Patroni does not answer at {', '.join(self.patroni)}"
+        if self.patroni:
+            return f"Patroni does not answer at {', '.join(self.patroni)}"
+        return "a failover could lose what it confirms (synchronous_standby_names is empty)"
+
+    async def said(self, primary: Primary) -> str | None:
+        """Return what Patroni says against this primary, "" for nothing, None if no Patroni answers."""
+        answers = await asyncio.gather(*(_asked(each) for each in self.patroni))
+        ours = [each for each in answers if each is not None]
+        if not ours:
+            return None
+        if any(each.identifier not in {None, primary.identifier} for each in ours):
+            return f"a Patroni at {', '.join(self.patroni)} leads another cluster"
+        if any(each.is_primary and each.timeline > primary.timeline for each in ours):
+            return "another server has taken over from it"
+        if not any(each.is_synchronous for each in ours):
+            return "a failover could lose what it confirms (synchronous_mode of Patroni is off)"
+        return ""  # while a primary has no replica, Patroni promotes none
+
+
+class Watch:
+    """Asks Patroni, if there is one, about the primary of one connection, every few seconds, on a thread
+    of its own, so that no commit waits for the answer."""
+
+    def __init__(self, failover: Failover, primary: Primary) -> None:
+        self._failover: Final = failover
+        self._primary: Final = primary
+        self._over = threading.Event()
+        #: What Patroni says against the primary; the connection is not to be used any more.
+        self.doubt = ""
+        if failover.patroni:
+            threading.Thread(target=self._run, name="failover watch", daemon=True).start()
+
+    def end(self) -> None:
+        """Let the thread end; nothing is asked any more."""
+        self._over.set()
+
+    def _run(self) -> None:
+        while not self._over.wait(_WATCH_S) and not self.doubt:
+            self.doubt = asyncio.run(self._failover.said(self._primary)) or ""
 
 
 def failover_of(url: URL) -> tuple[Failover | None, URL]:
@@ -93,58 +136,79 @@ def engine_of(url: URL, arguments: Mapping[str, Any], **options: Any) -> AsyncEn
     known |= {"target_session_attrs": "primary", **arguments}
 
     async def connect() -> Any:
-        return await _first([{**known, "host": host, "port": port} for host, port in hosts])
+        return await _connected_to_primary(
+            [{**known, "host": host, "port": port} for host, port in hosts]
+        )
 
     return create_async_engine(url, async_creator=connect, **options)
 
 
-async def _first(servers: Iterable[Mapping[str, Any]]) -> Any:
-    """Connect to all servers at once, and return the first connection to a primary: a server that is
-    silent must not use up the time of the others."""
+async def _connected_to_primary(servers: Iterable[Mapping[str, Any]]) -> Any:
+    """Connect to all servers at once, and return the connection to the primary: a server that is
+    silent must not use up the time of the others. Of two, an old primary that lives on has the lower
+    timeline."""
     waiting = {asyncio.ensure_future(asyncpg.connect(**each)): _place(each) for each in servers}
-    faults: dict[str, BaseException] = {}
+    primaries: dict[Any, int] = {}
     chosen: Any = None
     try:
-        while chosen is None and len(faults) < len(waiting):
-            left = [each for each in waiting if waiting[each] not in faults]
-            done, _ = await asyncio.wait(left, return_when=asyncio.FIRST_COMPLETED)
+        left: set[asyncio.Future[Any]] = set(waiting)
+        while left:
+            done, left = await asyncio.wait(
+                left,
+                timeout=_GRACE_S if primaries else None,
+                return_when=asyncio.FIRST_COMPLETED,
+            )
+            if not done:
+                break
             for each in done:
-                if (fault := each.exception()) is not None:
-                    faults[waiting[each]] = fault
-                else:
-                    chosen = each.result()
+                if each.exception() is None:
+                    primaries[each.result()] = await each.result().fetchval(TIMELINE)
+        if primaries:
+            chosen = max(primaries, key=lambda each: primaries[each])
+            return chosen
+        raise _no_primary({place: each.exception() for each, place in waiting.items()})
     finally:
         for each in waiting:
             each.cancel()
         for other in await asyncio.gather(*waiting, return_exceptions=True):
             if isinstance(other, asyncpg.Connection) and other is not chosen:
                 other.terminate()
-    if chosen is None:
-        told = "; ".join(f"{place}: {_told(fault)}" for place, fault in faults.items())
-        speaking = (each for each in faults.values() if isinstance(each, asyncpg.PostgresError))
-        raise NoPrimary(f"none of its servers is a primary ({told})") from next(
-            speaking, next(iter(faults.values()))
-        )
-    return chosen
 
 
-async def _asked(address: str, identifier: str) -> str:
-    """Return `synchronous` if the Patroni at an address replicates synchronously, "" if it does not
-    answer, else what is wrong with it."""
+def _no_primary(faults: Mapping[str, BaseException | None]) -> NoPrimary:
+    """Return the error for servers none of which is a primary, with why each is not."""
+    told = "; ".join(f"{place}: {_told(fault)}" for place, fault in faults.items())
+    error = NoPrimary(f"none of its servers is a primary ({told})")
+    speaking = (each for each in faults.values() if isinstance(each, asyncpg.PostgresError))
+    error.__cause__ = next(speaking, next(iter(faults.values())))
+    return error
+
+
+class _Answer(NamedTuple):
+    """The answer of one Patroni: about its server, and about the settings of its cluster."""
+
+    identifier: str | None
+    is_primary: bool
+    timeline: int
+    is_synchronous: bool
+
+
+async def _asked(address: str) -> _Answer | None:
+    """Ask the Patroni at an address; None if it does not answer."""
     import httpx  # slow to load, and only clusters need it
 
     try:
         async with httpx.AsyncClient(timeout=_PATRONI_S) as client:
             state = (await client.get(f"{address}/patroni")).json()
             settings = (await client.get(f"{address}/config")).raise_for_status().json()
-        if state.get("database_system_identifier") not in {None, identifier}:
-            return f"the Patroni at {address} leads another cluster"
-        mode = settings.get("synchronous_mode")
-    except (httpx.HTTPError, OSError, ValueError, AttributeError):
-        return ""
-    if mode in {True, "on", "quorum"}:
-        return _SYNCHRONOUS
-    return "a failover could lose what it confirms (synchronous_mode of Patroni is off)"
+        return _Answer(
+            state.get("database_system_identifier"),
+            state.get("role") in {"master", "primary"},
+            int(state.get("timeline") or 0),
+            settings.get("synchronous_mode") in {True, "on", "quorum"},
+        )
+    except (httpx.HTTPError, OSError, ValueError, AttributeError, TypeError):
+        return None
 
 
 def _several(value: str | tuple[str, ...]) -> tuple[str, ...]:
@@ -155,7 +219,7 @@ def _place(server: Mapping[str, Any]) -> str:
     return f"{server['host']}:{server['port'] or 5432}"
 
 
-def _told(fault: BaseException) -> str:
+def _told(fault: BaseException | None) -> str:
     if isinstance(fault, asyncpg.TargetServerAttributeNotMatched):
         return "a read-only copy"
     return cause_of(fault) if isinstance(fault, Exception) else type(fault).__name__

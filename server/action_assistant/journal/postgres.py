@@ -10,15 +10,25 @@ from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
 from sqlalchemy import URL, Connection, NullPool, func, select
-from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.event import listens_for
+from sqlalchemy.exc import DBAPIError, DisconnectionError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
+from sqlalchemy.pool import ConnectionPoolEntry
 from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Before, Branch, Overtaken, cause_of, no_copy
 from action_assistant.journal.events import Event
-from action_assistant.journal.failover import Failover, engine_of, failover_of, hosts_of
+from action_assistant.journal.failover import (
+    TIMELINE,
+    Failover,
+    Primary,
+    Watch,
+    engine_of,
+    failover_of,
+    hosts_of,
+)
 from action_assistant.journal.migrate import kept_as_it_is, upgrade_to
 from action_assistant.schema.editor_tables import editor_event
 
@@ -70,8 +80,12 @@ FROM unnest($1::text[], $2::bigint[], $3::text[], $4::text[], $5::bigint[],
 #: A commit that waits for the replica: once it is confirmed, the replica has all that came before, also a
 #: commit whose wait ended with its connection, and that would be lost in a failover (decision 168).
 _BARRIER: Final = "SELECT pg_logical_emit_message(true, 'action-assistant', '')"
-_STANDBYS: Final = "SELECT current_setting('synchronous_standby_names')"
-_IDENTIFIER: Final = "SELECT system_identifier::text FROM pg_control_system()"
+_PRIMARY: Final = (
+    "SELECT current_setting('synchronous_standby_names'),"
+    f" (SELECT system_identifier::text FROM pg_control_system()), ({TIMELINE})"
+)
+#: Commits that a failover keeps: they wait for the replica's disk.
+_KEPT: Final = frozenset({"on", "remote_apply"})
 _END_OLD: Final = """
 SELECT pg_terminate_backend(pid) FROM pg_stat_activity
 WHERE application_name = $1 AND pid <> pg_backend_pid()
@@ -85,8 +99,12 @@ class PostgresSession:
 
     connection: Connection
 
-    def __init__(self, engine: AsyncEngine, begin: Callable[[Any], Awaitable[None]]) -> None:
+    def __init__(
+        self, engine: AsyncEngine, begin: Callable[[Any], Awaitable[Watch | None]]
+    ) -> None:
         self._engine = engine
+        self._watch: Watch | None = None
+        self._warned = ""
         self._loop = asyncio.new_event_loop()
         self._open: AsyncConnection | None = None
         self._raw: Any = None
@@ -96,10 +114,12 @@ class PostgresSession:
             self.close()
             raise
 
-    async def _connect(self, begin: Callable[[Any], Awaitable[None]]) -> None:
+    async def _connect(self, begin: Callable[[Any], Awaitable[Watch | None]]) -> None:
         self._open = await self._engine.connect()
         self._raw = (await self._open.get_raw_connection()).driver_connection
-        await begin(self._raw)
+        self._raw.add_log_listener(self._hear_warning)
+        self._watch = await begin(self._raw)
+        self._check()
         sync = self._open.sync_connection
         assert sync is not None
         self.connection = sync
@@ -110,7 +130,7 @@ class PostgresSession:
 
     def alive(self) -> bool:
         self._loop.run_until_complete(_hear())
-        return not self._raw.is_closed()
+        return not self._raw.is_closed() and not (self._watch is not None and self._watch.doubt)
 
     def begin(self) -> None:
         """Open a transaction on the server, for this session."""
@@ -119,6 +139,17 @@ class PostgresSession:
     def say(self, command: str) -> None:
         """Execute a command of SQL without a result."""
         await_only(self._raw.execute(command))
+        self._check()
+
+    def _hear_warning(self, _: object, message: Any) -> None:
+        if message.severity_en == "WARNING":
+            self._warned = str(message)
+
+    def _check(self) -> None:
+        """Raise Unfit if what was just confirmed is in doubt. A commit whose wait for the replica was
+        cancelled succeeds with a warning, in the language of the server."""
+        if self._watch is not None and (doubt := self._warned or self._watch.doubt):
+            raise Unfit(doubt)
 
     def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
         """Write events, each with its link of the hash chain, and the new end of each stream (the
@@ -146,6 +177,7 @@ class PostgresSession:
             )
         except (asyncpg.NotNullViolationError, asyncpg.UniqueViolationError) as error:
             raise Overtaken(heads) from error
+        self._check()
 
     def close(self) -> None:
         """Close the connection at once; an uncommitted transaction is rolled back."""
@@ -155,6 +187,8 @@ class PostgresSession:
             self._loop.close()
 
     async def _end(self) -> None:
+        if self._watch is not None:
+            self._watch.end()
         if self._open is not None:
             # One that was aborted, as after a silence, does not even know whether it is in a transaction.
             gone = self._raw is None or self._raw.is_closed()
@@ -186,11 +220,27 @@ class Postgres:
         self.address: Final = url.set(drivername="postgresql").render_as_string(hide_password=False)
         self._me = f"action-assistant {os.getpid()} {secrets.token_hex(8)}"
         self._key = 0
+        self._connects = 0  # of the writer
         self._readers = self._engine(
             {"application_name": f"{self._me} reads", "default_transaction_read_only": "on"},
             pool_size=_READERS,
             pool_pre_ping=True,
         )
+        if self._failover is not None:
+            self._let_readers_follow()
+
+    def _let_readers_follow(self) -> None:
+        """Let no connection of readers outlive that of the writer: it may be to an old primary."""
+        pool = self._readers.sync_engine.pool
+
+        @listens_for(pool, "connect")
+        def note(_: object, record: ConnectionPoolEntry) -> None:
+            record.info["connects"] = self._connects
+
+        @listens_for(pool, "checkout")
+        def check(_: object, record: ConnectionPoolEntry, __: object) -> None:
+            if record.info["connects"] != self._connects:
+                raise DisconnectionError
 
     def open(
         self, branch: Branch, before: Before = no_copy, *, upgrades: bool = True
@@ -249,27 +299,38 @@ class Postgres:
             )
         return PostgresSession(self._engine(server, poolclass=NullPool), self._take_over)
 
-    async def _take_over(self, raw: Any) -> None:
+    async def _take_over(self, raw: Any) -> Watch | None:
         for name, (allowed, why) in _SETTINGS.items():
             value = await raw.fetchval("SELECT current_setting($1)", name)
             if value not in allowed:
                 raise Unfit(f"{why} ({name} is {value})")
-        await self._check_failover(raw)
+        primary = await self._checked_primary(raw)
         await raw.execute(_END_OLD, self._me)
         until = time.monotonic() + _HANDOVER
         while not await raw.fetchval("SELECT pg_try_advisory_lock($1)", self._key):
             if time.monotonic() > until:
                 raise Unfit("it is in use by another process")
             await asyncio.sleep(0.05)
-        if self._failover is not None:
-            await raw.execute(_BARRIER)
+        if self._failover is None or primary is None:
+            return None
+        await raw.execute(_BARRIER)
+        self._connects += 1  # readers follow
+        return Watch(self._failover, primary)
 
-    async def _check_failover(self, raw: Any) -> None:
-        """Raise Unfit if a failover could lose what the server confirms."""
-        if self._failover is not None:
-            standbys, identifier = await raw.fetchval(_STANDBYS), await raw.fetchval(_IDENTIFIER)
-            if why := await self._failover.weakness(standbys, identifier):
-                raise Unfit(why)
+    async def _checked_primary(self, raw: Any) -> Primary | None:
+        """Return what the server says of itself, None where no other takes over from it. Raise Unfit if
+        a failover could lose what it confirms."""
+        if self._failover is None:
+            return None
+        commit = await raw.fetchval("SELECT current_setting('synchronous_commit')")
+        if commit not in _KEPT:  # a pooler may drop the setting of this session
+            raise Unfit(
+                f"it confirms commits before its replica has them (synchronous_commit is {commit})"
+            )
+        primary = Primary(*await raw.fetchrow(_PRIMARY))
+        if why := await self._failover.weakness(primary):
+            raise Unfit(why)
+        return primary
 
     def lost(self, error: Exception) -> bool:
         """Return whether an error is the fault of the server or the connection, and not of the
@@ -347,10 +408,8 @@ def weakness(connection: Connection, failover: Failover | None) -> str:
             return f"{why} ({name} is {value})"
     if failover is None:
         return ""
-    standbys, identifier = (
-        str(connection.exec_driver_sql(asked).scalar_one()) for asked in (_STANDBYS, _IDENTIFIER)
-    )
-    return str(await_only(failover.weakness(standbys, identifier)))
+    primary = Primary(*connection.exec_driver_sql(_PRIMARY).one())
+    return str(await_only(failover.weakness(primary)))
 
 
 class Unfit(OSError):
