@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -33,8 +34,17 @@ def test_who_is_asked_reads_the_order_in_words_and_says_yes_to_exactly_that(
         assert runner.post("/api/robots", json=robot).is_success
         (tmp_path / "pair.json").write_text(json.dumps(GRAPH))
         graph = product.cli("import", str(tmp_path / "pair.json")).stdout.split()[0]
-        asked = {"umrf": GRAPH, "engines": ["David"], "graph": graph}
-        (look,) = runner.post("/api/preflight", json=asked).json()
+        with product.editor() as editor:
+            version = editor.post(f"/api/graphs/{graph}/versions", json={})
+            assert version.is_success, version.text
+
+        def looked(umrf: dict[str, Any]) -> dict[str, Any]:
+            asked = {"umrf": umrf, "engines": ["David"], "graph": graph}
+            (look,) = runner.post("/api/preflight", json=asked).json()
+            found: dict[str, Any] = look
+            return found
+
+        alien, look = looked(GRAPH | {"graph_name": "other"})["order_digest"], looked(GRAPH)
         digest = look["order_digest"]
 
         def ask(digest: str) -> None:
@@ -43,12 +53,16 @@ def test_who_is_asked_reads_the_order_in_words_and_says_yes_to_exactly_that(
 
         ask(digest)
         ask("a" * 64)
+        ask(alien)
         lines = product.cli("runs", "second-person", graph).stdout.splitlines()
         assert f"  Graph: the version with the digest {look['tree_digest']}" in lines
         assert any(line.startswith("  How often: each time that a person starts") for line in lines)
         unknown = product.cli("runs", "second-person", graph, "--yes", "a" * 12)
         assert "not known in words" in unknown.stderr
         assert product.cli("runs", "second-person", graph, "--yes", "b" * 12).returncode != 0
+        other = product.cli("runs", "second-person", graph, "--yes", alien[:12])
+        assert (other.returncode != 0, "no version of this graph" in other.stderr) == (True, True)
+        assert runner.get("/api/approvals", params={"digest": alien}).json() == []
         said = product.cli("runs", "second-person", graph, "--yes", digest[:12])
         assert said.returncode == 0, said.stderr
         given = runner.get("/api/approvals", params={"digest": digest}).json()

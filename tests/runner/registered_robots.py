@@ -26,6 +26,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.start.admission import GroupRequest
 from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter
@@ -128,11 +129,14 @@ def given(graph: Graph, name: str) -> Graph:
 
 
 @asynccontextmanager
-async def fleet(harness: Harness, **robots: Open) -> AsyncIterator[ExecutionService]:
-    """A runner that knows these robots, after they have answered for the first time."""
+async def fleet(
+    harness: Harness, now: IdentityNow = unchanged, **robots: Open
+) -> AsyncIterator[ExecutionService]:
+    """A runner that knows these robots, after they have answered for the first time. `now`: who was
+    ended."""
     reach = Robots(reach=RegisteredRobots(**robots))
     async with ExecutionService.opened(
-        harness.journal, reach, clock_us=clock_us, run_in_worker=at_once
+        harness.journal, reach, clock_us=clock_us, run_in_worker=at_once, identity_now=now
     ) as control:
         for name in robots:
             await control.register(Registration(name=name), ANN)

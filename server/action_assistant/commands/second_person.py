@@ -8,7 +8,7 @@ from action_assistant.errors import RequestRefused
 from action_assistant.safe_text import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
 _SHOWN = 12  # characters of a digest
 
@@ -38,7 +38,9 @@ def _second_person(options: argparse.Namespace) -> int:
         query = {"graph": graph}
         asked = server.runner("GET", "/api/approvals/asked", params=query).json()
         if options.yes is not None:
-            digest = _digest_in(asked, options.yes)
+            versions = server.editor("GET", f"/api/graphs/{graph}/versions").json()
+            trees = {each["tree_digest"] or each["digest"] for each in versions}
+            digest = _digest_in(asked, options.yes, trees)
             server.runner("POST", "/api/approvals", json={"digest": digest, "graph": graph})
             print(f"said yes to exactly {digest[:_SHOWN]}")
             return 0
@@ -50,15 +52,18 @@ def _second_person(options: argparse.Namespace) -> int:
     return 0
 
 
-def _digest_in(asked: "Sequence[dict[str, Any]]", prefix: str) -> str:
-    """Return the digest of the one question that a person names by its beginning. Raise RequestRefused
-    if there is none, or its words are not known."""
+def _digest_in(asked: "Sequence[dict[str, Any]]", prefix: str, trees: "Collection[str]") -> str:
+    """Return the digest of the one question that a person names by its beginning. `trees`: the digests
+    of all versions of the graph. Raise RequestRefused if there is no such question, its words are not
+    known, or it is about none of these versions."""
     found = {each["digest"]: each for each in asked if each["digest"].startswith(prefix)}
     if len(prefix) < _SHOWN or len(found) != 1:
         raise RequestRefused(f"{prefix!r} names no one question here; it has {_SHOWN} characters.")
     ((digest, question),) = found.items()
     if not question["order"]:
         raise RequestRefused("What is asked is not known in words: look at the start yourself.")
+    if question["tree_digest"] not in trees:
+        raise RequestRefused("What is asked is no version of this graph, whoever says so.")
     return str(digest)
 
 

@@ -180,10 +180,11 @@ def _identity_now(
     standings: Standings, revoked: Revocations, identity: Identity
 ) -> Identity | None:
     """Return an identity with the role and groups of its person now; None if it, or its person, was
-    ended, or has expired. Without session and token it is that of the owner's token."""
+    ended, or has expired. Without session and token it is that of the owner's token, or a person who
+    is not here."""
     credential = identity.session or identity.token
     if credential is None:
-        return None if revoked.person_ended(identity.person.id) else identity
+        return None if revoked.person_ended(identity.person.id) else standings.known(identity)
     standing = standings.of(credential)
     if revoked.ends(credential) or standing.expired:
         return None

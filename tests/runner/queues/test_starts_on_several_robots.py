@@ -26,9 +26,12 @@ from action_assistant.runner.queues.entry import (
 )
 from action_assistant.runner.queues.robot_queue import Entry
 from action_assistant.runner.queues.service import Queues
+from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.events import draft_of
 from action_assistant.runner.start.approvals import ApprovalRequest
-from action_assistant.runner.start.kept_starts import text_of
+from action_assistant.runner.start.kept_starts import group_of, text_of
+from action_assistant.runner.start.orders import ordered
+from action_assistant.umrf.limits import Limit
 from runner.harness import clock_us, order, sequence, until, virtual
 from runner.queues.test_queues import (
     Lab,
@@ -40,8 +43,9 @@ from runner.queues.test_queues import (
     reopened,
     why_closed,
 )
-from runner.start.test_rights_registry import ANN, BEN, author
+from runner.start.test_rights_registry import ANN, BEN, OLGA, author
 
+LIMIT = Limit(parameter="torque", most=60.0)
 ROBOTS = ("Carol", "David", "Ed", "Flo")
 
 
@@ -291,3 +295,77 @@ async def test_a_stored_entry_with_a_cast_is_no_start_on_several_robots() -> Non
                 await reopened(queues, robot)
         await queues.remove(kept.id, author(ANN), ANN)
         assert (queues.entries, lab.david.starts, lab.carol.starts) == ((), [], [])
+
+
+@virtual
+async def test_a_yes_to_a_start_on_several_robots_names_them_and_one_to_one_robot_starts_none() -> (
+    None
+):
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        for name in ("Carol", "David"):
+            demanding = Registration(name=name, profile={"second_person": True})
+            await control.register(demanding, author(ANN))
+            await until(lambda: control.robots.robot("David").heard_at is not None)
+        await until(lambda: control.robots.robot("Carol").heard_at is not None)
+        await control.rights.set_rules("Carol", Rules(limits=(LIMIT,)), OLGA)
+        entry = await put(queues, both())
+        one_robot = ordered(order(sequence("task")), entry.entered.digest, (), {})
+        await control.approvals.give(ApprovalRequest(digest=one_robot.digest), author(BEN))
+        with pytest.raises(Conflict, match="nobody else has said yes"):
+            await begun(queues, entry)
+        looks = (await queues.look(entry.id, {}, BEN)).looks
+        assert len({each.order for each in looks}) == 1
+        words = [f"{each.what}: {each.text}" for each in looks[0].order]
+        assert 'Robots: handed over whole to all of ["Carol","David"] at once' in words
+        assert not any("one robot" in each for each in words)
+        assert lab.david.starts == lab.carol.starts == []
+        (digest,) = {each.order_digest for each in looks}
+        await control.approvals.give(ApprovalRequest(digest=digest), author(BEN))
+        assert len((await begun(queues, entry)).runs) == 2
+
+
+@virtual
+async def test_a_press_sent_again_says_too_which_robot_was_not_started() -> None:
+    lab = Lab({"*": [{"after_s": 30}]})
+    async with lab.runner() as (control, queues):
+        entry = await put(queues, both())
+        look = await queues.look(entry.id, {}, ANN)
+        lab.harness.journal.slow = 0.5
+        found: list[Grouped] = []
+
+        async def press() -> None:
+            started = await queues.start(entry.id, TurnRequest(look.digest), author(ANN), ANN)
+            assert isinstance(started, Grouped)
+            found.append(started)
+
+        async with anyio.create_task_group() as people:
+            people.start_soon(press)
+            await until(lambda: bool(lab.carol.starts))
+            lab.harness.journal.down = True  # the start on David cannot be stored
+        lab.harness.journal.slow, lab.harness.journal.down = 0.0, False
+        await anyio.sleep(10)
+        await press()
+        for each in found:
+            assert ([run.engine for run in each.runs], set(each.failed)) == (["Carol"], {"David"})
+        assert (lab.david.starts, len(lab.carol.starts)) == ([], 1)
+        control.stop_all(author(ANN))
+
+
+@virtual
+async def test_no_start_from_outside_takes_a_request_id_of_the_queue_or_of_a_repeat() -> None:
+    lab = Lab()
+    async with lab.runner() as (control, queues):
+        entry, other = await put(queues, both()), await put(queues, on("David", "other"))
+        ids = (*entry.entered.requests, *other.entered.requests, "repeat/r/1", "queue")
+        for taken in ids:
+            foreign = order(sequence("sim"), engine="simulator", request_id=taken)
+            with pytest.raises(BadInput, match="is given by the runner alone") as refused:
+                await control.start(foreign, author(BEN), BEN)
+            assert refused.value.where == {"path": "/request_id"}
+            group = group_of(foreign, ("Carol", "David"))
+            group = msgspec.structs.replace(group, request_id=taken)
+            with pytest.raises(BadInput, match="is given by the runner alone"):
+                await control.start_group(group, author(BEN), BEN)
+        assert queues.entries == (entry, other)
+        assert len((await begun(queues, entry)).runs) == 2

@@ -24,9 +24,12 @@ from action_assistant.runner.start.approvals import (
     Approvals,
 )
 from action_assistant.runner.start.orders import order_of
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.facts import BadProfile, facts_of
 from action_assistant.web.auth.caller import Caller, set_caller
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.roles import Role
 from runner.execution.test_conductor import shared
 from runner.harness import ANN, BEN, Harness, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, change, fleet, group, verdicts
@@ -36,9 +39,11 @@ CARL = Author("carl", "Carl")
 
 
 @asynccontextmanager
-async def careful(harness: Harness, david: Open) -> AsyncIterator[ExecutionService]:
+async def careful(
+    harness: Harness, david: Open, now: IdentityNow = unchanged
+) -> AsyncIterator[ExecutionService]:
     """A runner whose robot demands a second person."""
-    async with fleet(harness, David=david) as control:
+    async with fleet(harness, now, David=david) as control:
         demanding = Registration(name="David", profile={"second_person": True})
         await control.register(demanding, ANN)
         await until(lambda: control.robots.robot("David").heard_at is not None)
@@ -319,3 +324,30 @@ async def test_a_question_is_shown_with_its_values_for_a_day() -> None:
     large = msgspec.structs.replace(asked, values={"Go_0": {"place": "x" * 70_000}})
     with pytest.raises(BadInput, match="bytes"):
         await approvals.ask(large, ANN)
+
+
+@virtual
+async def test_a_yes_counts_only_while_its_person_may_still_give_it() -> None:
+    david, graph, roles = Open(NEVER), sequence(), dict[str, Role | None]()
+
+    def now(identity: Identity) -> Identity | None:
+        role = roles.get(identity.person.id, identity.person.role)
+        if role is None:
+            return None
+        person = msgspec.structs.replace(identity.person, role=role)
+        return msgspec.structs.replace(identity, person=person)
+
+    async with careful(Harness(), david, now) as control:
+        start = order(graph, engine="David")
+        await control.approvals.give(yes(start.digest), BEN)
+        lost: tuple[Role | None, ...] = ("viewer", "editor", None)
+        for role in lost:
+            roles["ben"] = role
+            (look,) = await control.look(group(graph, "David"), "ann")
+            assert verdicts(look)["approved"] == "blocked"
+            with pytest.raises(Conflict, match="Ben, who did, may not say so any more"):
+                await control.start(start, ANN)
+            assert david.starts == []
+        roles["ben"] = "operator"
+        assert (await control.start(start, ANN)).fresh
+        control.stop_all(ANN)

@@ -131,3 +131,26 @@ def test_the_last_day_of_a_person_is_in_the_audit(product: Product) -> None:
     with product.editor() as editor:
         texts = [row["text"] for row in editor.get("/api/audit").json()["rows"]]
     assert any("Dated" in text and "until 2030-05-06 07:08 UTC" in text for text in texts)
+
+
+def test_the_yes_of_a_person_counts_no_more_when_they_may_not_say_it_any_more(
+    product: Product, arrive: Arrive
+) -> None:
+    mari = added(product, "Mari says yes")
+    guest = arrive(product)
+    come(guest, mari)
+    digest = "5" * 64
+    assert guest.runner("POST", "/api/approvals", {"digest": digest}).is_success
+
+    def counts(times: int) -> bool:
+        with product.runner() as runner:
+            return len(runner.get("/api/approvals", params={"digest": digest}).json()) == times
+
+    eventually(lambda: counts(1))
+    change(product, mari, role="editor")
+    eventually(lambda: counts(0))
+    change(product, mari, role="operator")
+    eventually(lambda: counts(1))
+    with product.editor() as editor:
+        assert editor.post(f"/api/members/{mari['id']}/end").is_success
+    eventually(lambda: counts(0))

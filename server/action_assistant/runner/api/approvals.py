@@ -63,7 +63,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
 
     @get(
         "/api/approvals",
-        summary="The approvals of a graph, by its digest",
+        summary="The approvals of a graph, by its digest, of people who may still give them",
         operation_id="listApprovals",
         description="Of a start with values, overrides or several robots `digest` is the "
         "`order_digest` of its pre-flight, which says the same in words (`order`), else the tree digest. "
@@ -77,7 +77,10 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         unseen = unseen_by(services, request)
         given = await services.control.approvals.given_for(digest)
         return [
-            _approval(each) for each in given if unseen is None or each.graph not in unseen.graphs
+            _approval(each)
+            for each in given
+            if services.control.approvals.counts(each)
+            and (unseen is None or each.graph not in unseen.graphs)
         ]
 
     @post(

@@ -38,17 +38,19 @@ C = TypeVar("C", bound=Closable)
 
 class DoubtWatch(Generic[C]):
     """Watches runs, robots and Stops. `closables`: returns all that may be open; `close`: called at once
-    with one that was open, and a doubt. Its owner calls `look_at` with each run that changes."""
+    with one that was open, and a doubt; `again`: with one that was closed already. Its owner calls `look_at` with each run that changes."""
 
     def __init__(
         self,
         control: ExecutionService,
         closables: Callable[[], Iterable[C]],
         close: Callable[[C, Doubt], None],
+        again: Callable[[C, Doubt], None] = lambda _closable, _doubt: None,
     ) -> None:
         self._control = control
         self._closables = closables
         self._close = close
+        self._again = again
         self._seen: LruCache[str, frozenset[tuple[str, int | None]]] = LruCache(_SEEN)
         control.watch_robots(self._robots_changed)
         control.watch_stops(self._stopped)
@@ -66,8 +68,7 @@ class DoubtWatch(Generic[C]):
     def meet(self, closable: C, doubt: Doubt) -> None:
         """Note a doubt about one of them."""
         closable.doubts += 1
-        if closable.is_open:
-            self._close(closable, doubt)
+        (self._close if closable.is_open else self._again)(closable, doubt)
 
     def look_at(self, run: Run) -> None:
         """Close whatever a change of a run concerns."""

@@ -104,7 +104,9 @@ class ExecutionService:
         self.robots = robots
         self.history = RunHistory(runtime.journal, past)
         self.sight: Final = sources.sight
-        self.approvals: Final = Approvals(runtime.journal, runtime.clock_us)
+        self.approvals: Final = Approvals(
+            runtime.journal, runtime.clock_us, identity_now, sources.sight
+        )
         self._runtime = runtime
         self._robot_watchers: list[Callable[[], None]] = []
         self._stop_watchers: list[Callable[[Author, str, str], None]] = []
@@ -399,7 +401,7 @@ class ExecutionService:
         for each in (whole_of(run), run):
             if each in self.open and self._stop(each, author, stop_id):
                 return [each]
-        parts = [each for each, opened in tuple(self.open.items()) if run in _wholes_of(opened.run)]
+        parts = [each for each, opened in tuple(self.open.items()) if run in opened.run.wholes]
         if parts:
             self._stops.note(run, author, stop_id)
             return self._stop_each(parts, author, stop_id)
@@ -693,8 +695,3 @@ class ExecutionService:
 
 def _ignore_stop(_author: Author, _robot: str, _run: str) -> None:
     """Ignore a Stop that found nothing to stop."""
-
-
-def _wholes_of(run: Run) -> set[str]:
-    """Return the ids of what a run is a part of: a group, and a led run whose piece it is."""
-    return {run.group or "", run.piece.run if run.piece is not None else ""} - {""}

@@ -154,11 +154,15 @@ class StartChecks:
         return msgspec.structs.replace(requested, sight=request.sight, unsighted=unsighted)
 
     async def accept(
-        self, request: StartRequest, starter: Identity, often: Often = None
+        self,
+        request: StartRequest,
+        starter: Identity,
+        often: Often = None,
+        together: Sequence[str] = (),
     ) -> AcceptedStart:
         """Take a request through all checks that may refuse it, and wait for the answer of the
-        robot. `starter`: the person who starts; `often`: how often it is carried out. Raise a subclass of
-        Refused if one check does."""
+        robot. `starter`: the person who starts; `often`: how often it is carried out; `together`: all
+        robots of a start on several. Raise a subclass of Refused if one check does."""
         if request.drill and len(engines_of(request)) != 1:
             raise BadInput("A Stop drill is made on one robot.", where={"path": "/drill"})
         if self.leads(request.engine, request.robots):
@@ -180,7 +184,9 @@ class StartChecks:
         require_plain(request)
         prepare = partial(prepared, earlier=earlier, limits=limits)
         ready = await self._run_in_worker(prepare, request, robot.facts, random_id())
-        order = ordered(request, ready.tree_digest, overridden_in(request), limits, often)
+        limits = self._rights.limits(together or [request.engine])
+        codes = overridden_in(request)
+        order = ordered(request, ready.tree_digest, codes, limits, often, together)
         return await self._accept_on(robot, request, ready, starter, order=order)
 
     def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
@@ -195,7 +201,8 @@ class StartChecks:
         """Accept the starts on several engines, all at the same time, and wait for their answers.
         `starter`, `often`: as for `accept`. Raise Conflict, with the reasons of all engines, if at
         least one start is refused."""
-        return await _all_accepted(requests, lambda each: self.accept(each, starter, often))
+        names = [each.engine for each in requests]
+        return await _all_accepted(requests, lambda each: self.accept(each, starter, often, names))
 
     async def _accept_on(
         self,
@@ -451,7 +458,6 @@ class StartChecks:
             return await self._look_conducted(group.for_engine(CONDUCTED), starter, often)
         found: dict[str, Preflight] = {}
         courses: list[Item] = []
-
         refused: list[Refused] = []
 
         async def look(engine: str) -> None:
@@ -473,7 +479,9 @@ class StartChecks:
         if refused:
             raise refused[0]
         looks = [preflight.with_items(found[engine], courses) for engine in group.engines]
-        return await self._approved(looks, group.for_engine(group.engines[0]), starter, often)
+        first, together = group.for_engine(group.engines[0]), group.engines
+        together = () if SIMULATOR in together else together  # such a look is at each by itself
+        return await self._approved(looks, first, starter, often, together)
 
     async def _look_conducted(
         self, request: StartRequest, starter: Identity, often: Often
@@ -569,7 +577,12 @@ class StartChecks:
         return [*items, *await self._look_led.items(robot, view.answer, starter, claim)]
 
     async def _approved(
-        self, looks: Sequence[Preflight], request: StartRequest, starter: Identity, often: Often
+        self,
+        looks: Sequence[Preflight],
+        request: StartRequest,
+        starter: Identity,
+        often: Often,
+        together: Sequence[str] = (),
     ) -> list[Preflight]:
         """Return the pre-flights of a start with the items about a second person, who says yes also to
         what it overrides; if it does not say that yet, to what all of them would. The order in words is
@@ -580,8 +593,9 @@ class StartChecks:
         for look in looks:
             is_robot = look.engine not in {SIMULATOR, CONDUCTED} and look.tree_digest
             robot = self._robots.registration(look.engine) if is_robot else None
-            robots = engines_of(request) if is_led else (look.engine,)
-            order = ordered(request, look.tree_digest, codes, self._rights.limits(robots), often)
+            robots = engines_of(request) if is_led else together or (look.engine,)
+            limits = self._rights.limits(robots)
+            order = ordered(request, look.tree_digest, codes, limits, often, together)
             item = robot and await self._approvals.item(
                 robot, order.approving, starter.person.id, _named(order)
             )

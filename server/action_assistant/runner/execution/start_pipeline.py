@@ -16,6 +16,7 @@ nothing behind, and a start that cannot be stored is not sent.
 
 from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Final
 from weakref import WeakValueDictionary
 
 import anyio
@@ -37,6 +38,11 @@ from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrde
 from action_assistant.runner.start.orders import Often, claim_of, engines_of, kept_for
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.web.auth.identity import Identity
+
+#: Why nothing was sent to one of several robots, as far as a later request knows.
+NOT_WITH: Final = "It was not started with the others."
+#: How the request ids begin that the queue and repeats give to their starts.
+_INNER: Final = ("queue/", "repeat/")
 
 
 class Started(msgspec.Struct, frozen=True):
@@ -91,6 +97,7 @@ class StartPipeline:
         message has left. `repeat`: the repeat of which the run is a cell; `often`: how often it is
         carried out, for the yes of a second person. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         stops = self._stops.count
+        _require_own_id(request.request_id, often)
         async with self._claims.once(request.request_id):
             known = await self._known(request)
             if known is not None:
@@ -119,13 +126,14 @@ class StartPipeline:
         if not group.request_id or not is_of_robots:
             where = "/engines" if group.request_id else "/request_id"
             raise BadInput("A group has a request_id, and robots only.", where={"path": where})
+        _require_own_id(group.request_id, often)
         async with self._claims.once(group.request_id):
             found = [await self._known(each) for each in requests]
             if known := [run for run in found if run is not None]:
                 missing = [
                     each.engine for each, run in zip(requests, found, strict=True) if not run
                 ]
-                failed = dict.fromkeys(missing, "It was not started with the others.")
+                failed = dict.fromkeys(missing, NOT_WITH)
                 return Grouped(known[0].group or "", known, failed, fresh=False)
             await self._checks.require_sight(group, starter)
             async with self.turns(group.engines):
@@ -244,6 +252,14 @@ class StartPipeline:
             except Refused as why:
                 failed[each.request.engine] = why.detail
         return Grouped(group, runs, failed, fresh=True)
+
+
+def _require_own_id(request_id: str, often: Often) -> None:
+    """Raise BadInput if a start that is neither of the queue nor of a repeat has a request id of these:
+    its runs would count as theirs."""
+    if often is None and f"{request_id}/".startswith(_INNER):
+        text = 'A request_id that begins with "queue/" or "repeat/" is given by the runner alone.'
+        raise BadInput(text, where={"path": "/request_id"})
 
 
 def _to_store(

@@ -22,7 +22,7 @@ from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.execution.doubts import DoubtWatch
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.execution.start_pipeline import Grouped, Started
+from action_assistant.runner.execution.start_pipeline import NOT_WITH, Grouped, Started
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.queues.entry import (
     MOST,
@@ -195,8 +195,7 @@ class Queues:
     ) -> tuple[Look, Looked]:
         group = group_of(start, engines)
         looks = await self._control.look(group, identity.person.id, identity, turn)
-        of = self._control.rights.of
-        now = looked_of(looks, {name: of(name).rules for name in robots})
+        now = looked_of(looks, {each: self._control.rights.of(each).rules for each in robots})
         differs = differences(seen, now, looks)
         digest = digest_of(now, looks, None if turn is None else turn.ready_at)
         return Look(tuple(looks), differs, digest, overridden_in(start)), now
@@ -528,7 +527,10 @@ class Queues:
         runs = [await self._control.find(row.id) for row in rows]
         if runs[0].group is None:
             return Started(runs[0], fresh=False)
-        return Grouped(runs[0].group, runs, {}, fresh=False)
+        entered = (await self._journal.read(stream_of(id_), limit=1))[0]
+        missing = set(msgspec.json.decode(entered.body, type=QueueEntered).together)
+        missing -= {run.engine for run in runs}
+        return Grouped(runs[0].group, runs, dict.fromkeys(sorted(missing), NOT_WITH), fresh=False)
 
     def _leave(self, entry: Entry, run: Run) -> None:
         """Take out an entry that has become a run, in this step, and store that."""

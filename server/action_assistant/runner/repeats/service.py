@@ -65,12 +65,14 @@ _RESTARTED: Final = "The runner was started again. Nothing of a repeat goes on a
 
 class _Record(Closable):
     """A repeat in memory. `runs`: the run of each cell that was started; `openings`: how often it was
-    opened in this process; `turn`: one start at a time; `storing`: one event at a time."""
+    opened in this process; `since`: when the newest doubt was seen, or it came into memory, µs UTC, at each
+    doubt a later one; `turn`: one start at a time; `storing`: one event at a time."""
 
-    def __init__(self, repeat: Repeat, start: StartRequest) -> None:
+    def __init__(self, repeat: Repeat, start: StartRequest, since: int) -> None:
         super().__init__(repeat.opened.robots)
         self.repeat = repeat
         self.start = start
+        self.since = since
         self.runs: dict[int, str] = {}
         self.openings = 0
         self.turn = anyio.Lock()
@@ -116,7 +118,9 @@ class Repeats:
         self._run_in_worker = run_in_worker
         self._records: dict[str, _Record] = {}
         self._opening = anyio.Lock()
-        self._doubts = DoubtWatch[_Record](control, self._records.values, self._close)
+        self._doubts = DoubtWatch[_Record](
+            control, self._records.values, self._close, self._doubted
+        )
         control.watch(self._run_changed)
 
     @classmethod
@@ -244,7 +248,7 @@ class Repeats:
                 where: dict[str, object] = {"path": "/start/request_id"}
                 raise Conflict("This request_id belongs to another repeat.", where=where)
             return known, False
-        record = _Record(Repeat(opened=opened), start)
+        record = _Record(Repeat(opened=opened), start, opened.at)
         self._keep(record)
         try:
             drafts = [draft_of(opened, author.id), draft_of(StartKept(text_of(start)), author.id)]
@@ -438,6 +442,7 @@ class Repeats:
         if not record.is_open and record.repeat.closed is not None and not is_stored:
             return
         record.is_open = False
+        self._doubted(record, reason)
         event = RepeatClosed(
             at=self._clock_us(), why=reason.why, text=reason.text, by=reason.by, run=reason.run
         )
@@ -445,6 +450,11 @@ class Repeats:
         self._tasks.start_soon(self._store, record, event)
         why = "Its repeat was closed before anything was sent."
         self._control.hold_back(record.repeat.id, why)
+
+    def _doubted(self, record: _Record, _doubt: Doubt) -> None:
+        """Let no second person's yes count who did not know of a doubt. What was seen while it was closed
+        is in memory only: that it is read again counts as a doubt, too."""
+        record.since = max(self._clock_us(), record.since + 1)
 
     def _follow(self, record: _Record, event: RepeatEvent) -> None:
         followed = follow(record.repeat, event)
@@ -498,7 +508,7 @@ class Repeats:
             return self._records[id_]
         events = await self._journal.read(stream_of(id_))
         repeat = self._as_now(replay((each.kind, each.body) for each in events))
-        record = _Record(repeat, start_in(events))
+        record = _Record(repeat, start_in(events), self._clock_us())
         for row in await self._journal.query(queries.of_repeat(id_)):
             record.runs[row.summary["repeat"]["cell"]] = row.id
         if id_ not in self._records:  # another caller may have read it meanwhile
@@ -534,11 +544,12 @@ def _start_of(record: _Record, cell: int, watching: Watching) -> StartRequest:
 
 def _often(record: _Record) -> InRepeat:
     """Return how often the start of a repeat is carried out, as a second person says yes to it: to all its
-    cells at once, until it is closed again."""
+    cells at once, until the next doubt."""
     opened = record.repeat.opened
     return InRepeat(
         repeat=opened.repeat,
         closings=record.repeat.closings,
+        since=record.since,
         times=opened.times,
         grid=tuple((each.action, each.name, each.values) for each in opened.grid),
         seed=opened.seed,

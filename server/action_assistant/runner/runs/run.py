@@ -277,6 +277,11 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
         return tuple(sorted(set(self.led.players.values())))
 
     @property
+    def wholes(self) -> set[str]:
+        """The ids of what the run is a part of: a group, and a led run whose piece it is."""
+        return {self.group or "", self.piece.run if self.piece is not None else ""} - {""}
+
+    @property
     def doubt(self) -> str:
         """The reason why no answer of the engine can prove now that the run is at rest; "" if one
         can."""

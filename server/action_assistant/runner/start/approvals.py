@@ -19,12 +19,18 @@ from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.runs.sight import NO_RULES, RunSight
 from action_assistant.runner.start.orders import Ordered, OrderLine
 from action_assistant.runner.start.preflight import Item
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.umrf.facts import SECOND_PERSON
 from action_assistant.umrf.kept_values import as_json
 from action_assistant.umrf.start_values import MOST_BYTES, StartValues
 from action_assistant.web.auth import caller
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import SERVER_OWNER, Person
+from action_assistant.web.auth.rights import Denied, may
+from action_assistant.web.auth.roles import OWNER, Role
 
 #: The stream of all approvals.
 STREAM: Final = "approvals"
@@ -102,11 +108,19 @@ class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
 
 class Approvals:
     """Stores approvals and reads them, each event once. Raises Unavailable while the journal cannot
-    be read."""
+    be read. `identity_now`: as of the rights of robots; `sight`: who may see which graphs."""
 
-    def __init__(self, journal: RunnerJournal, clock_us: ClockUs) -> None:
+    def __init__(
+        self,
+        journal: RunnerJournal,
+        clock_us: ClockUs,
+        identity_now: IdentityNow = unchanged,
+        sight: RunSight = NO_RULES,
+    ) -> None:
         self._journal = journal
         self._clock_us = clock_us
+        self._identity_now = identity_now
+        self._sight = sight
         self._seq = 0
         self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
         self._questions: defaultdict[str, deque[ApprovalAsked]] = defaultdict(
@@ -189,6 +203,17 @@ class Approvals:
         await self._read()
         return tuple(self._by_digest.get(digest, ()))
 
+    def counts(self, given: ApprovalGiven) -> bool:
+        """Return whether whoever has given an approval may still give it: they may operate robots, and see
+        the graph. That of a person of whom nothing more is known counts."""
+        role: Role = OWNER if given.author.id == SERVER_OWNER else "operator"
+        who = Person(given.author.id, given.author.name, role)
+        now = self._identity_now(Identity(who))
+        if now is None or isinstance(may(now, "operate", now=self._clock_us() / 1e6), Denied):
+            return False
+        unseen = self._sight.unseen(now)
+        return unseen is None or given.graph not in unseen.graphs
+
     async def questions_of(self, graph: str) -> tuple[ApprovalAsked, ...]:
         """Return who asked others for an approval of a start of this graph within the last day, and
         for which start; the newest first."""
@@ -214,13 +239,14 @@ class Approvals:
     ) -> Item | None:
         """Return the pre-flight item about approval; None where the robot asks for none. It passes
         when somebody else than the starter has approved one of these orders, by digest, with another
-        browser than the one of this request. Of a link for several people nobody knows how many use
+        browser than the one of this request, and may still do so. Of a link for several people nobody knows how many use
         it: who came by one is no second person (decision 126). `what`: the order in words."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
         every = [each for digest in orders for each in await self.given_for(digest)]
         given = [each for each in every if each.author.id != starter]
-        named = [each for each in given if each.is_named is not False]
+        valid = [each for each in given if self.counts(each)]
+        named = [each for each in valid if each.is_named is not False]
         here = caller.device()
         others = [each.author for each in named if not here or each.device != here]
         if not others:
@@ -228,8 +254,11 @@ class Approvals:
             if named:
                 who = named[0].author.name or "somebody"
                 why += f": the yes of {who} came from the browser that you use"
-            elif given:
+            elif given and not valid:
                 who = given[0].author.name or "somebody"
+                why += f": {who}, who did, may not say so any more"
+            elif valid:
+                who = valid[0].author.name or "somebody"
                 why += (
                     f": {who} came by a link that several people may use. An owner can give them a "
                     "personal link"

@@ -2,9 +2,10 @@
 yes to, as a digest and in words. Pure."""
 
 import hashlib
+import json
 import math
 from collections.abc import Callable, Collection, Iterator
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any, Final, TypeAlias
 
 import msgspec
@@ -56,12 +57,13 @@ class InQueue(msgspec.Struct, frozen=True):
 
 
 class InRepeat(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that is carried out once for each cell of this repeat, until that is closed again. `closings`: how often it was
-    closed; `values`: of all cells; `grid`: action, input and values in turn; `times`, `seed`: as in
-    `RepeatRequest`."""
+    """A start that is carried out once for each cell of this repeat, until a doubt. `closings`: how often it was
+    closed; `since`: when the newest doubt was seen, also while it was closed, µs UTC; `values`: of all
+    cells; `grid`: action, input and values in turn; `times`, `seed`: as in `RepeatRequest`."""
 
     repeat: str
     closings: int
+    since: int
     times: int
     grid: tuple[tuple[str, str, tuple[Value, ...]], ...]
     seed: int | None
@@ -111,7 +113,7 @@ class Ordered(msgspec.Struct, frozen=True):
         if "repeat" not in parts and "queue" not in parts:
             text = "each time that a person starts exactly this by itself; no repeat"
             found.append(OrderLine("How often", text))
-        if "robots" not in parts:
+        if "robots" not in parts and "together" not in parts:
             text = "handed over whole to one robot, whichever asks for a second person"
             found.append(OrderLine("Robots", text))
         for name in _WORDS:
@@ -128,12 +130,13 @@ def ordered(
     codes: Collection[str],
     limits: Limits,
     often: Often = None,
+    together: Collection[str] = (),
 ) -> Ordered:
     """Return the order of a start: the version (`tree_digest`), and where there are any, the values, the
     robots of a led run with what happens when one is lost and the script of what the simulator plays in
     it, the overridden `codes`, the `limits` in force on its robots, its breakpoints, that its sub-graphs
-    are opened, where it begins (the record of an earlier run, which is over, does not change), and how
-    often it is carried out."""
+    are opened, where it begins (the record of an earlier run, which is over, does not change), how
+    often it is carried out, and the robots that get the whole graph `together`, if they are several."""
     more: dict[str, Any] = {}
     values = often.values if isinstance(often, InRepeat) else request.values
     if values:
@@ -154,6 +157,8 @@ def ordered(
         more["breakpoints"] = msgspec.to_builtins(request.breakpoints)
     if request.levels != "one_step":
         more["levels"] = request.levels
+    if len(together) > 1:
+        more["together"] = sorted(together)
     match often:
         case InQueue():
             more["queue"] = msgspec.to_builtins(often)
@@ -178,7 +183,9 @@ _Words: TypeAlias = Iterator[tuple[str, str]]
 
 
 def _text(value: object) -> str:
-    return as_json(value)
+    """Return a value as JSON without characters that nobody sees: these turn, or imitate, other words."""
+    text = as_json(value)
+    return "".join(each if each.isprintable() else json.dumps(each)[1:-1] for each in text)
 
 
 def _of_values(values: dict[str, dict[str, Any]]) -> _Words:
@@ -201,7 +208,7 @@ def _of_people(people: dict[str, str]) -> _Words:
 def _of_override(codes: list[str]) -> _Words:
     for code in codes:
         meaning = CODES[code].meaning if code in CODES else ""
-        yield "In spite of", f"{code}: {meaning}" if meaning else code
+        yield "In spite of", f"{code}: {meaning}" if meaning else _text(code)
 
 
 def _of_limits(limits: dict[str, list[dict[str, Any]]]) -> _Words:
@@ -224,7 +231,7 @@ def _of_beginning(start: dict[str, Any]) -> _Words:
     for action, choice in sorted((start.get("choices") or {}).items()):
         yield "Was under way", f"{_text(action)}: {choice}"
     if start.get("reason"):
-        yield "Known because", start["reason"]
+        yield "Known because", _text(start["reason"])
 
 
 def _of_breakpoints(breakpoints: list[dict[str, Any]]) -> _Words:
@@ -245,8 +252,12 @@ def _of_breakpoints(breakpoints: list[dict[str, Any]]) -> _Words:
 
 
 def _of_queue(queue: dict[str, Any]) -> _Words:
-    since = datetime.fromtimestamp(queue["ready_at"] / 1e6, UTC).isoformat()
+    since = _moment(queue["ready_at"])
     yield "How often", f"once, at the turn of its entry {queue['entry']} that came at {since}"
+
+
+def _moment(at: int) -> str:
+    return (datetime.fromtimestamp(0, UTC) + timedelta(microseconds=at)).isoformat()
 
 
 def _of_repeat(repeat: dict[str, Any]) -> _Words:
@@ -257,7 +268,9 @@ def _of_repeat(repeat: dict[str, Any]) -> _Words:
         yield "In turn", f"{_text(name)} of {_text(action)} = each of {_text(values)}"
     if repeat["seed"] is not None:
         yield "Sequence", f"each round shuffled by the seed {repeat['seed']}"
-    yield "Repeat", f"{repeat['repeat']}, closed {repeat['closings']} times before this"
+    since = _moment(repeat["since"])
+    closings = f"closed {repeat['closings']} times before this"
+    yield "Repeat", f"{repeat['repeat']}, {closings}, without a doubt since {since}"
 
 
 _LOST: Final[dict[str, str]] = {
@@ -270,6 +283,9 @@ _WORDS: Final[dict[str, Callable[[Any], _Words]]] = {
     "queue": _of_queue,
     "values": _of_values,
     "robots": _of_robots,
+    "together": lambda names: iter(
+        [("Robots", f"handed over whole to all of {_text(names)} at once")]
+    ),
     "lost": lambda lost: iter([("If a robot is lost", _LOST[lost])]),
     "people": _of_people,
     "override": _of_override,

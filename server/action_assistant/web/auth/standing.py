@@ -8,8 +8,10 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Final
 
+import msgspec
+
 from action_assistant.web.auth.confirmations import Confirmations
-from action_assistant.web.auth.identity import Credential, Standing, Token, View
+from action_assistant.web.auth.identity import Credential, Identity, Standing, Token, View
 from action_assistant.web.auth.keys import Person, Session
 from action_assistant.web.auth.passkeys import PasskeyFiles
 from action_assistant.web.auth.people_files import PeopleFiles
@@ -65,6 +67,17 @@ class Standings:
             ask_again = self.passkeys.of(person.id).ask_again
         groups = frozenset(file.groups if file is not None else ())
         return Standing(person, groups, over, confirmed_at, ask_again)
+
+    def known(self, identity: Identity) -> Identity | None:
+        """Return an identity without a credential with the role and groups that its person has now; as it
+        is, if nothing is known of the person; None if the time of the person is over."""
+        file = self.people.get(identity.person.id)
+        if file is None:
+            return identity
+        if file.until is not None and self._clock() >= file.until:
+            return None
+        person = Person(file.id, file.name or identity.person.name, file.role)
+        return msgspec.structs.replace(identity, person=person, groups=frozenset(file.groups))
 
     def _is_idle(self, session: Session, role: Role, now: float) -> bool:
         """Return whether a session was not used for too long. One whose last use is unknown, as on
