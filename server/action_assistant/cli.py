@@ -93,7 +93,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         described=True,
     ),
     "stop": CommandEntry(
-        "remote", "stop a run, or all of them; exit 1 unless it is proven", described=True
+        "stop", "stop a run, or all of them; exit 1 unless it is proven", described=True
     ),
     "sync": CommandEntry(
         "sync.sync",

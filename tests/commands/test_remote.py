@@ -18,10 +18,11 @@ from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.cli import main
-from action_assistant.commands import remote
+from action_assistant.commands import stop
 from action_assistant.commands.client import Server
 from action_assistant.commands.presses import press
-from action_assistant.commands.remote import insisting, stopped_as, verdict
+from action_assistant.commands.remote import verdict
+from action_assistant.commands.stop import insisting, stopped_as
 from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
@@ -331,8 +332,8 @@ def test_a_stop_without_an_answer_leads_to_the_hardware_stop(
     product: Product, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The runner is frozen, as one whose computer hangs."""
-    monkeypatch.setattr(remote, "_STOP_ANSWER_S", 0.5)
-    monkeypatch.setattr(remote, "_INSIST_S", 0.5)
+    monkeypatch.setattr(stop, "_STOP_ANSWER_S", 0.5)
+    monkeypatch.setattr(stop, "_INSIST_S", 0.5)
     runner = product.process("runner")
     runner.suspend()
     try:
