@@ -18,7 +18,7 @@ import msgspec
 
 from action_assistant import paths, settings
 from action_assistant.commands.runners import Runners
-from action_assistant.commands.stored_tokens import StoredToken, stored_token
+from action_assistant.commands.stored_tokens import StoredToken, server_key, stored_token
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.logs import say
 from action_assistant.settings import Site
@@ -36,6 +36,7 @@ T = TypeVar("T")
 
 _TOKEN: Final = "ACTION_ASSISTANT_TOKEN"
 _EDITOR_S: Final = 3.0  # for which a Stop waits for the editor, which only says where the runner is
+_EDITOR_SILENT: Final = "The editor does not say where its runners are."
 #: The form of a graph's id.
 _MADE_ID: Final = re.compile(r"[A-Za-z0-9]{12}")
 
@@ -93,8 +94,17 @@ def names_server(options: argparse.Namespace) -> bool:
     return options.url is not None or options.port is not None
 
 
+class Known(NamedTuple):
+    """The runners of a server, as far as a command knows them. `further`: a sentence about runners
+    that a Stop of everything does not reach; `is_in_doubt`: this server may have such runners."""
+
+    sites: tuple[Site, ...]
+    further: str = ""
+    is_in_doubt: bool = False
+
+
 class Server:
-    """A client of a running editor and its runners. `sites`: all runners, if there are several;
+    """A client of a running editor and its runners. `known`: all of them, if there are several;
     `no_editor`: why no request reaches an editor."""
 
     def __init__(
@@ -102,10 +112,11 @@ class Server:
         editor: "httpx.Client",
         runner_url: str,
         no_editor: str = "",
-        sites: tuple[Site, ...] = (),
+        known: Known | None = None,
     ) -> None:
         self._client = editor
-        self.runners = Runners(partial(request, editor), sites or (Site("", runner_url),))
+        self.known: Final = known or Known((Site("", runner_url),))
+        self.runners = Runners(partial(request, editor), self.known.sites)
         self._no_editor = no_editor
 
     @property
@@ -127,7 +138,7 @@ class Server:
 
     def at(self, site: Site) -> "Server":
         """Return a client of the editor and the runner of one site."""
-        return Server(self._client, site.url, self._no_editor, (site,))
+        return Server(self._client, site.url, self._no_editor, Known((site,)))
 
     def graph_id(self, asked: str) -> str:
         """Return the id of the graph with the id or name `asked`. Raise RequestRefused unless
@@ -195,10 +206,13 @@ class _Found(NamedTuple):
     no_editor: str = ""
 
 
-def _found(options: argparse.Namespace, trust: ssl.SSLContext) -> _Found:
+def _found(
+    options: argparse.Namespace, trust: ssl.SSLContext, *, without_editor: bool = False
+) -> _Found:
     """Find the server that a command is meant for: that of its URL or port, else the one that serves
-    its data folder, else what the environment names. Raise CannotStart if a data folder was named
-    whose server is not known, so that no other server is asked."""
+    its data folder, else what the environment names. `without_editor`: if nothing serves a folder that
+    names several runners, its first one will do, since the others may live. Raise CannotStart if a
+    data folder was named whose server is not known, so that no other server is asked."""
     from_environment = None if options.folder_is_named else os.environ.get("ACTION_ASSISTANT_URL")
     if named := options.url or (from_environment if options.port is None else None):
         return _Found(named, None, supposed=False)
@@ -218,9 +232,14 @@ def _found(options: argparse.Namespace, trust: ssl.SSLContext) -> _Found:
     ended = next((each for each in addresses if each is not None), None)
     if ended is not None or (options.folder_is_named and _is_of_a_server(data)):
         last = f" The last one, at {ended.url}, was killed." if ended is not None else ""
+        kept, unread = _kept(data) if without_editor else ((), "")
+        if kept:
+            no_editor = f"No editor serves {data} now."
+            return _Found(kept[0].url, kept[0].url, supposed=True, no_editor=no_editor)
         raise CannotStart(
             f"No server serves {data} now, as far as the folder says, so nothing was sent to any "
-            f"server.{last} Name one of an older version, or on another computer, with --port or --url."
+            f"server.{last} Name one of an older version, or on another computer, with --port or "
+            f"--url. {unread}".rstrip()
         )
     named = os.environ.get("ACTION_ASSISTANT_URL")
     url = named or _at_port(settings.port(), trust)
@@ -244,7 +263,20 @@ def _served(
 
 def _is_of_a_server(data: Path) -> bool:
     """Return whether a folder is the data folder of a server, and not only one with a token."""
-    return any((data / name).exists() for name in ("editor.db", "editor.database", "runner.db"))
+    return _is_of_an_editor(data) or (data / "runner.db").exists()
+
+
+def _is_of_an_editor(data: Path) -> bool:
+    """Return whether a folder has the journal of an editor, or says where it is."""
+    return any((data / name).exists() for name in ("editor.db", "editor.database"))
+
+
+def _kept(data: Path) -> tuple[tuple[Site, ...], str]:
+    """Return the sites of a data folder, none with one runner, and why they cannot be read."""
+    try:
+        return kept_sites(data), ""
+    except CannotStart as error:
+        return (), str(error)
 
 
 @contextmanager
@@ -254,38 +286,63 @@ def running(options: argparse.Namespace, *, without_editor: bool = False) -> Ite
     CannotStart if the server is not reached or not proven, RequestRefused if it refuses the token."""
     import httpx
 
-    found = _found(options, _trust(options))
+    found = _found(options, _trust(options), without_editor=without_editor)
     reached = _reach(options, found)
     with httpx.Client(**reached) as client:
         if found.runner is not None:
-            runner = found.runner
-            first, *others = kept_sites(options.data.resolve()) or (Site("", runner),)
-            sites = (Site(first.name, runner), *others)
+            data = options.data.resolve()
+            known = _runners_of(data, found, found.runner, without_editor=without_editor)
         else:
-            runner, sites = _runner_urls(client, options, found, without_editor=without_editor)
-        reached["auth"].named |= {each.url for each in sites if port_of(each) is None}
-        yield Server(client, runner, found.no_editor, sites)
+            known = _runner_urls(client, options, found, without_editor=without_editor)
+        reached["auth"].named |= {each.url for each in known.sites if port_of(each) is None}
+        yield Server(client, known.sites[0].url, found.no_editor, known)
+
+
+def _runners_of(data: Path, found: _Found, runner: str, *, without_editor: bool) -> Known:
+    """Return the runners of the server of a data folder, whose own is at the URL `runner`. Raise
+    CannotStart if they cannot be read; `without_editor`: this one alone is asked then."""
+    kept, unread = _kept(data)
+    if unread and not without_editor:
+        raise CannotStart(unread)
+    first, *others = kept or (Site("", runner),)
+    known = Known((Site(first.name, runner), *others))
+    if unread:
+        return _in_doubt(known.sites, unread)
+    if found.no_editor and not others and not _is_of_an_editor(data):
+        said = f"Only the runner of {data} was asked: an editor elsewhere may have further runners."
+        return known._replace(further=said)
+    return known
+
+
+def _in_doubt(sites: tuple[Site, ...], why: str) -> Known:
+    """Return runners of which nobody knows whether they are all. `why`: a sentence."""
+    asked = " and ".join(f"{each.name} at {each.url}".removeprefix(" at ") for each in sites)
+    return Known(
+        sites,
+        f"NOT KNOWN whether there are further runners: no Stop was sent except to {asked}. {why} Look "
+        "at the robots; use their hardware stops.",
+        is_in_doubt=True,
+    )
 
 
 def _runner_urls(
     client: "httpx.Client", options: argparse.Namespace, found: _Found, *, without_editor: bool
-) -> tuple[str, tuple[Site, ...]]:
-    """Return the URL of the runner, and all sites if there are several. With a token that has expired
-    the editor does not say them, and those known at the login count: such a token may still stop."""
+) -> Known:
+    """Return the runners, as the editor says them. With a token that has expired it does not, and
+    those known at the login count: such a token may still stop."""
     patience = {"timeout": _EDITOR_S} if without_editor else {}
     try:
         config = decoded(request(client, "GET", "/api/config", **patience), RunnerUrls)
-    except RequestRefused as refusal:
-        stored = _stored(str(client.base_url))
-        if refusal.status != 401 or stored is None or not stored.runner_url:
-            raise
-        return stored.runner_url, stored.runners
-    except CannotStart:
-        beside = _runner_beside(client.base_url, options, found) if without_editor else None
+    except (RequestRefused, CannotStart) as error:
+        beside = None
+        if without_editor:
+            beside = _runners_beside(client.base_url, options, found)
+        elif isinstance(error, RequestRefused) and error.status == 401:
+            beside = _at_login(client.base_url)
         if beside is None:
             raise
         return beside
-    return config.runner_url, config.runners
+    return Known(config.runners or (Site("", config.runner_url),))
 
 
 class RunnerUrls(msgspec.Struct, frozen=True):
@@ -295,21 +352,47 @@ class RunnerUrls(msgspec.Struct, frozen=True):
     runners: tuple[Site, ...] = ()
 
 
-def _runner_beside(
+def _runners_beside(
     editor: "httpx.URL", options: argparse.Namespace, found: _Found
-) -> tuple[str, tuple[Site, ...]] | None:
-    """Return the URL of the runner, and all sites if there are several, beside an editor that does not answer: the one that was known at
-    the login, else the port after the editor's. Return None for an editor without a port in its
-    URL, as behind a proxy, where nobody has signed in."""
+) -> Known | None:
+    """Return the runners beside an editor that does not say them: those that its data folder names,
+    else those that were known at the login, else the one at the port after the editor's. Return None
+    for an editor without a port in its URL, as behind a proxy, where nobody has signed in."""
+    kept, is_all = _in_folder(str(editor), options.data.resolve())
+    if kept:
+        return Known(kept) if is_all else _in_doubt(kept, _EDITOR_SILENT)
+    beside = _at_login(editor)
+    if beside is None and editor.port is not None:
+        url = editor.copy_with(port=editor.port + 1)
+        if found.supposed:  # no editor was there to tell whether it speaks TLS
+            url = url.copy_with(scheme=_scheme(editor.port + 1, _trust(options)))
+        beside = _in_doubt((Site("", str(url).rstrip("/")),), _EDITOR_SILENT)
+    return Known(beside.sites) if beside is not None and is_all else beside
+
+
+def _at_login(editor: "httpx.URL") -> Known | None:
+    """Return the runners that were known at the login; None where nobody has signed in."""
     stored = _stored(str(editor))
-    if stored is not None and stored.runner_url:
-        return stored.runner_url, stored.runners
-    if editor.port is None:
+    if stored is None or not stored.runner_url:
         return None
-    url = editor.copy_with(port=editor.port + 1)
-    if found.supposed:  # no editor was there to tell whether it speaks TLS
-        url = url.copy_with(scheme=_scheme(editor.port + 1, _trust(options)))
-    return str(url).rstrip("/"), ()
+    sites = stored.runners or (Site("", stored.runner_url),)
+    return _in_doubt(sites, f"{_EDITOR_SILENT} These are the runners of the login.")
+
+
+def _in_folder(editor: str, data: Path) -> tuple[tuple[Site, ...], bool]:
+    """Return the sites that a data folder names, if it is that of an editor, and whether these are all
+    runners: the editor of this folder lives at this URL, however long it has been silent."""
+    try:
+        sites, here, at = kept_sites(data), served_address(data, "editor"), server_key(editor)
+        if here is not None and here.lives and here.is_here and server_key(here.url) == at:
+            return sites, True
+        port = urlsplit(at).port
+        beside = {f"{at}/runner", f"http://127.0.0.1:{port + 1}" if port else ""}
+        is_its_own = bool(sites) and server_key(sites[0].url) in beside
+    except CannotStart as error:
+        say(str(error), "warning")
+        return (), False
+    return (sites, False) if is_its_own else ((), False)
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:

@@ -74,9 +74,22 @@ def _stop(options: argparse.Namespace) -> int:
     nothing is in doubt, else 1. Raise RequestRefused if the Stop is refused, CannotStart if the
     server does not answer."""
     with _reached_for_stop(options) as server:
-        if server.runners.has_several:
-            return _stop_at_sites(server, options)
-        stopped = _stopped(server, options)
+        known, is_done = server.known, False
+        try:
+            code = (
+                _stop_at_sites(server, options)
+                if len(known.sites) > 1
+                else _stop_at(server, options)
+            )
+            is_done = not options.all
+        finally:
+            if known.further and not is_done:
+                print(one_line(known.further), file=sys.stderr, flush=True)
+    return 1 if known.is_in_doubt and options.all else code
+
+
+def _stop_at(server: Server, options: argparse.Namespace) -> int:
+    stopped = _stopped(server, options)
     stopped.print()
     return 1 if stopped.doubts else 0
 
