@@ -21,9 +21,15 @@ def test_two_runners_have_their_names_and_urls() -> None:
     )
 
 
-@pytest.mark.parametrize("given", [[], [""], [A]])
+@pytest.mark.parametrize("given", [[], [""]])
 def test_one_runner_needs_no_name(given: list[str]) -> None:
     assert sites(given, runner_port=8001) == ()
+
+
+@pytest.mark.parametrize("only", [A, B])
+def test_a_lone_name_is_refused_since_a_runner_may_have_been_forgotten(only: str) -> None:
+    with pytest.raises(CannotStart, match="is the only runner that is named"):
+        sites([only, ""], runner_port=8001)
 
 
 @pytest.mark.parametrize(
@@ -35,6 +41,8 @@ def test_one_runner_needs_no_name(given: list[str]) -> None:
         (f"{'B' * 41}=http://127.0.0.1:8011", "at most 40 letters"),
         ("HALL A=http://127.0.0.1:8011", "Two runners are called 'HALL A'"),
         ("Hall B=http://127.0.0.1:8001", "'Hall A' and 'Hall B' have one URL"),
+        ("Hall B=http://localhost:8001", "'Hall A' and 'Hall B' have one URL"),
+        ("Hall B=http://[::1]:8001", "'Hall A' and 'Hall B' have one URL"),
         ("Hall B=127.0.0.1:8011", "The URL of the runner 'Hall B' is none"),
         ("Hall B=ftp://127.0.0.1:8011", "The URL of the runner 'Hall B' is none"),
         ("Hall B=http://me@127.0.0.1:8011", "The URL of the runner 'Hall B' is none"),

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.private_files import DamagedFile, read_json, replace_file
+from action_assistant.private_files import read_json, replace_file
 from action_assistant.public_url import PublicUrl
 from action_assistant.settings import LOOPBACK, Site
 
@@ -21,7 +21,7 @@ def sites(
     given: Iterable[str], *, runner_port: int, public: PublicUrl | None = None, tls: bool = False
 ) -> tuple[Site, ...]:
     """Parse texts NAME=URL, of which the first is the runner beside the editor at `runner_port`, and
-    return the sites; empty if fewer than two are given, since one runner needs no name.
+    return the sites; empty without any, since one runner needs no name.
 
     A browser shows a session only to the host of the page. So each runner is at a port of this
     computer, or below the public address. Raise CannotStart, with the text, if one cannot be used.
@@ -35,17 +35,22 @@ def sites(
                 f"A runner is written NAME=URL, with a name of at most {_LONGEST_NAME} letters, not "
                 f"{text.strip()!r}."
             )
+        _check(site, public)
         for other in found:
             if other.name.casefold() == site.name.casefold():
                 raise CannotStart(f"Two runners are called {name!r}.")
-            if other.url == site.url:
+            if _place(other) == _place(site):
                 raise CannotStart(
                     f"The runners {other.name!r} and {name!r} have one URL, {site.url}."
                 )
-        _check(site, public)
         found.append(site)
-    if len(found) < 2:
+    if not found:
         return ()
+    if len(found) == 1:
+        raise CannotStart(
+            f"{found[0].name!r} is the only runner that is named. Name all, first the one beside the "
+            "editor, or leave it out: one runner needs no name."
+        )
     if tls:
         raise CannotStart(
             "Several runners cannot be served with --tls, since each would have a certificate of its "
@@ -64,6 +69,11 @@ def port_of(site: Site) -> int | None:
     """Return the port of this computer that a URL means; None for a URL of another host."""
     parts = urlsplit(site.url)
     return parts.port or 80 if (parts.hostname or "") in LOOPBACK else None
+
+
+def _place(site: Site) -> object:
+    """Return what is the same for two URLs of one runner."""
+    return port_of(site) or site.url
 
 
 def _check(site: Site, public: PublicUrl | None) -> None:
@@ -116,8 +126,11 @@ def kept_sites(data: Path) -> tuple[Site, ...]:
     read."""
     path = data / _FILE
     try:
-        return read_json(path, tuple[Site, ...])
+        found = read_json(path, tuple[Site, ...])
+        for each in found:
+            port_of(each)  # of a damaged URL there is none
     except (FileNotFoundError, NotADirectoryError):
         return ()
-    except (OSError, DamagedFile) as error:
+    except (OSError, ValueError) as error:
         raise CannotStart(f"The runners in {path} cannot be read ({error}).") from error
+    return found

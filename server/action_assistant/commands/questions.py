@@ -6,6 +6,7 @@ from typing import Any
 
 from action_assistant.commands.client import Server, command, print_json, running
 from action_assistant.commands.presses import press
+from action_assistant.commands.runners import Gathered
 from action_assistant.errors import RequestRefused
 from action_assistant.safe_text import one_line
 
@@ -48,25 +49,32 @@ def add_questions(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
 
 def _questions(options: argparse.Namespace) -> int:
     """Run the command that lists questions to people, and return the exit code."""
-    path = f"/api/runs/{options.run}/questions" if options.run else "/api/questions"
     with running(options) as server:
-        answer = server.runner("GET", path)
-    found = answer.json()
+        if not options.run:
+            return _waiting(server.runners.gathered("/api/questions"), as_json=options.json)
+        found = server.runner("GET", f"/api/runs/{options.run}/questions").json()
     if options.json:
         print_json(found)
         return 0
-    if options.run:
-        for each in found["open"]:
-            print(one_line(f"{each['id']}  {_said(each)}"))
-        for each in found["closed"]:
-            by = f"answered by {each['by']['name']}" if "by" in each else each["why"]
-            value = f": {_shown(each['value'])}" if "value" in each else ""
-            print(one_line(f"{each['question']}  {each['at']}  {each['action']}  {by}{value}"))
-        return 0
-    for each in found["questions"]:
+    for each in found["open"]:
+        print(one_line(f"{each['id']}  {_said(each)}"))
+    for each in found["closed"]:
+        by = f"answered by {each['by']['name']}" if "by" in each else each["why"]
+        value = f": {_shown(each['value'])}" if "value" in each else ""
+        print(one_line(f"{each['question']}  {each['at']}  {each['action']}  {by}{value}"))
+    return 0
+
+
+def _waiting(found: Gathered, *, as_json: bool) -> int:
+    """Print the questions that wait at all sites, and return the exit code."""
+    questions = found.json("questions")
+    if as_json:
+        print_json({"questions": questions})
+        return found.code
+    for each in questions:
         where = f"{each['run']}  {each['question']['id']}  {each['graph_name']}"
         print(one_line(f"{where}  {_said(each['question'])}{'' if each['may'] else '  (not you)'}"))
-    return 0
+    return found.code
 
 
 def _said(question: dict[str, Any]) -> str:

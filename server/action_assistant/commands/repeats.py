@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 
 from action_assistant.commands.client import Server, command, print_json, running
+from action_assistant.commands.runners import Gathered
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 
@@ -179,7 +180,7 @@ def add_repeats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
 
 
 def _repeats(options: argparse.Namespace) -> int:
-    path = f"/api/repeats/{options.repeat}" if options.repeat else "/api/repeats"
+    path = f"/api/repeats/{options.repeat}"
     if (options.csv or options.parquet) and not options.repeat:
         raise CannotStart(f"--{'csv' if options.csv else 'parquet'} is of one repeat: name it.")
     if options.parquet and sys.stdout.isatty():
@@ -187,6 +188,8 @@ def _repeats(options: argparse.Namespace) -> int:
     with running(options) as server:
         form = "parquet" if options.parquet else "csv"
         is_table = options.csv or options.parquet
+        if not options.repeat:
+            return _all(server.runners.gathered("/api/repeats"), as_json=options.json)
         answer = server.runner("GET", f"{path}/table?format={form}" if is_table else path)
     if options.parquet:
         sys.stdout.buffer.write(answer.content)
@@ -197,19 +200,24 @@ def _repeats(options: argparse.Namespace) -> int:
     found = answer.json()
     if options.json:
         print_json(found)
-    elif options.repeat:
+    else:
         for cell in found["cells"]:
             print(one_line(_line(cell)))
         if found["closed"] is not None:
             print(one_line(f"closed: {found['closed']['text']}"))
-    else:
-        for each in found:
-            state = "open" if each["closed"] is None else f"closed: {each['closed']['text']}"
-            total = f"{each['total']} runs" if each["total"] != 1 else "1 run"
-            print(
-                one_line(f"{each['id']}  {each['graph_name']}  {each['engine']}  {total}  {state}")
-            )
     return 0
+
+
+def _all(found: Gathered, *, as_json: bool) -> int:
+    """Print the repeats of all sites, and return the exit code."""
+    if as_json:
+        print_json(found.json())
+        return found.code
+    for each in found.json():
+        state = "open" if each["closed"] is None else f"closed: {each['closed']['text']}"
+        total = f"{each['total']} runs" if each["total"] != 1 else "1 run"
+        print(one_line(f"{each['id']}  {each['graph_name']}  {each['engine']}  {total}  {state}"))
+    return found.code
 
 
 def _next(options: argparse.Namespace) -> int:

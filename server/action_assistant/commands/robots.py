@@ -69,6 +69,7 @@ def _add_robots(robots: argparse.ArgumentParser) -> None:
 
     remove = command(words, "remove", "forget a robot; its runs stay in the history", "David")
     remove.add_argument("name", metavar="NAME")
+    remove.add_argument("--site", metavar="NAME", help="where several sites have one of this name")
     remove.set_defaults(handler=_remove)
     _add_rights(words)
     _add_drill(words)
@@ -276,7 +277,8 @@ def _add(options: argparse.Namespace) -> int:
 
 
 def _remove(options: argparse.Namespace) -> int:
-    with running(options) as server:
+    with running(options) as lab:
+        server = lab if options.site is None else lab.at(lab.runners.named(options.site))
         server.runner("DELETE", f"/api/robots/{quote(options.name, safe='')}")
     print(one_line(f"{options.name} is not registered any more"))
     return 0

@@ -36,12 +36,13 @@ class Gathered(NamedTuple):
     answers: "list[tuple[Site, httpx.Response]]"
     code: int
 
-    def json(self) -> list[Any]:
-        """Return the entries of all lists; of several, each with the name of its `site`."""
+    def json(self, name: str = "") -> list[Any]:
+        """Return the entries of all lists; of several, each with the name of its `site`. `name`: of the
+        list in each answer, which is the whole answer without it."""
         return [
             {**entry, "site": site.name} if site.name else entry
             for site, answer in self.answers
-            for entry in answer.json()
+            for entry in (answer.json()[name] if name else answer.json())
         ]
 
 
@@ -171,11 +172,17 @@ class Runners:
                     "/api/queue",
                     lambda queue: any(each["id"] == entry for each in queue["entries"]),
                 )
-            case ["runs" | "queue" | "groups" | "preflight"] if method == "POST":
-                return self._of_robots(_engines(sent))
-            case ["repeats"] if method == "POST":
-                return self._of_robots(_engines(sent.get("start", sent)))
+            case ["runs" | "queue" | "groups" | "preflight" | "repeats" | "asked_inputs"]:
+                return self._of_start(sent) if method == "POST" else None
         return None
+
+    def _of_start(self, sent: Mapping[str, Any]) -> Site | None:
+        """Return the site of the robots that a start names, else that of the run that it continues."""
+        start = sent.get("start", sent)
+        if site := self._of_robots([*_engines(sent), *_engines(start)]):
+            return site
+        earlier = start.get("from", {}).get("run")
+        return self._having(f"/api/runs/{earlier}") if earlier else None
 
     def _having(self, path: str, holds: Callable[[Any], bool] = lambda _: True) -> Site | None:
         """Return the site at which a GET of `path` is answered with what `holds` accepts; None if no
@@ -216,6 +223,12 @@ class Runners:
 
 def _of_several(homes: Mapping[str, list[Site]]) -> str:
     """Return a sentence that refuses a start on robots of several sites. `homes`: where each is."""
+    for robot, sites in homes.items():
+        if len(sites) > 1:
+            return (
+                f"{robot} is registered at {' and at '.join(site.name for site in sites)}, so it is not "
+                f"known which is meant. Take one away: robots remove {robot} --site {sites[-1].name!r}."
+            )
     at = "; ".join(
         f"{robot} at {' and '.join(site.name for site in sites)}"
         for robot, sites in homes.items()

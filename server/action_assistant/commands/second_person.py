@@ -36,20 +36,21 @@ def _second_person(options: argparse.Namespace) -> int:
     with running(options) as server:
         graph = server.graph_id(options.graph)
         query = {"graph": graph}
-        asked = server.runner("GET", "/api/approvals/asked", params=query).json()
+        found = server.runners.gathered("/api/approvals/asked", params=query)
+        asked = found.json()
         if options.yes is not None:
             versions = server.editor("GET", f"/api/graphs/{graph}/versions").json()
             trees = {each["tree_digest"] or each["digest"] for each in versions}
-            digest = _digest_in(asked, options.yes, trees)
-            server.runner("POST", "/api/approvals", json={"digest": digest, "graph": graph})
-            print(f"said yes to exactly {digest[:_SHOWN]}")
-            return 0
+            body = {"digest": _digest_in(asked, options.yes, trees), "graph": graph}
+            server.runners.tell("POST", "/api/approvals", json=body)
+            print(f"said yes to exactly {body['digest'][:_SHOWN]}")
+            return found.code
     if options.json:
         print_json(asked)
-        return 0
+        return found.code
     for each in asked:
         _print(each)
-    return 0
+    return found.code
 
 
 def _digest_in(asked: "Sequence[dict[str, Any]]", prefix: str, trees: "Collection[str]") -> str:
