@@ -215,7 +215,7 @@ test("a run goes again with one fault, in the simulator", async () => {
 test("a run that failed opens as a dry-run at any of its moments, and goes on otherwise", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/runs/${bad.id}`);
-  await page.getByRole("link", { name: "Dry-run from 0:00" }).click();
+  await page.getByRole("link", { name: /^Dry-run from/ }).click();
   const bar = page.getByRole("region", { name: "Dry-run" });
   await expect(bar.getByText("Wait 1 runs")).toBeVisible();
   await expect(card(page, "Wait").getByText("true")).toBeVisible(); // as it was then
