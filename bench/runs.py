@@ -10,7 +10,7 @@ import time
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import anyio
 import msgspec
@@ -298,8 +298,28 @@ def _room() -> Table:
     return Table(["a run", *head], rows)
 
 
+class RunSizes(NamedTuple):
+    """The size of one run: its events, and the bytes of what holds them."""
+
+    events: int
+    sent: int  # by the engine
+    journal: int
+    raw: int  # raw messages, gzipped
+    archive: int
+
+
 def _measured(actions: int, took: float) -> list[str]:
-    """In virtual time: so many actions, one after the other."""
+    sizes = sizes_of_a_run(actions, took)
+    return [
+        f"{actions:,} actions of {took:g} s",
+        f"{sizes.events:,}",
+        *(_size(each) for each in sizes[1:]),
+    ]
+
+
+def sizes_of_a_run(actions: int, took: float) -> RunSizes:
+    """Measure a run of so many actions, one after the other, in virtual time. `took`: the seconds of
+    each action."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         place, sent = run_in_virtual_time(lambda: _lived(folder, actions, took))
@@ -307,11 +327,7 @@ def _measured(actions: int, took: float) -> list[str]:
         journal = asyncio.run(_stored(folder, events))
         raw = sum(path.stat().st_size for path in folder.glob("recordings/*/*"))
         archived = (folder / "one.jsonl.gz").stat().st_size
-    return [
-        f"{actions:,} actions of {took:g} s",
-        f"{len(events):,}",
-        *(_size(each) for each in (sent, journal, raw, archived)),
-    ]
+    return RunSizes(len(events), sent, journal, raw, archived)
 
 
 async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:

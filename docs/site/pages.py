@@ -17,7 +17,7 @@ SECTIONS: Final = (
         "Administration",
         (
             *("administration", "installing", "containers", "network"),
-            *("people", "backups", "audit", "monitoring", "doctor"),
+            *("people", "backups", "audit", "monitoring", "doctor", "scale"),
         ),
     ),
     ("For programs", ("programs", "api/editor", "api/runner", "contracts", "room-protocol")),
