@@ -1,7 +1,9 @@
 /** The live sockets of two sites as one: what is unknown at one hides nothing of the other. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { sessionEnd } from "./http";
 import { LiveSites } from "./live-sites";
-import { openRuns, silentRobots, unheardRobots } from "./live-socket";
+import { openRuns, silentRobots, stateOf, unheardRobots } from "./live-socket";
+import { noteSite } from "./site-knowledge";
 
 /** The browser's end of a socket whose other end is the test. */
 class Wire {
@@ -147,4 +149,49 @@ test("a Stop of a run goes to its site, of an unknown one to all", () => {
   posted = [];
   live.stop("nobody-knows");
   expect(posted).toHaveLength(2);
+});
+
+test("what one site says wrongly keeps no Stop from the other, and is not known any more", () => {
+  const said = vi.spyOn(console, "error").mockImplementation(() => undefined);
+  for (const message of [
+    { type: "hello", runs: [] },
+    { type: "engines" },
+    { type: "hello", engines: [robot("Dora"), { name: "Z" }], runs: [] },
+    { type: "run", run: { id: "b" } },
+  ]) {
+    posted = [];
+    wireOf(B.url).say(message);
+    expect(live.state.sites?.map(({ state }) => state.link)).toEqual(["live", "down"]);
+    expect(live.state.runs.get("b")?.state).toBe("unknown");
+    live.stop("all");
+    expect(posted).toEqual([`${A.url}/api/stop`, `${B.url}/api/stop`]);
+    live.redial();
+    for (const { url } of [A, B]) wireOf(url).say({ type: "hello", engines: [], runs: [] });
+    wireOf(B.url).say({ type: "run", run: run("b", "Dora", 1) });
+  }
+  expect(said).toHaveBeenCalled();
+  live.subscribe(() => {
+    throw new Error("not drawn");
+  });
+  posted = [];
+  live.stop("all");
+  expect(posted).toHaveLength(2);
+  said.mockRestore();
+});
+
+test("a run that is known of a site without a live link is shown by the link of its site", () => {
+  wireOf(B.url).close(1006);
+  noteSite("read", B);
+  expect(stateOf(live.state, "read").link).toBe("down");
+  expect(stateOf(live.state, "nobody-knows").link).toBe("down"); // it may be there
+  expect(stateOf(live.state, "a").link).toBe("live");
+});
+
+test("a further site that does not know the session ends it nowhere else", async () => {
+  wireOf(B.url).close(4401);
+  await vi.advanceTimersByTimeAsync(100);
+  expect(sessionEnd.now()).toBe(false);
+  wireOf(A.url).close(4401);
+  expect(sessionEnd.now()).toBe(true);
+  sessionEnd.clear();
 });

@@ -2,7 +2,13 @@
 import { serverTimeOf, tick } from "../clock/server-clock";
 import { newAid } from "../graph/stop-basics";
 import { runnerWords } from "./http";
-import { LiveSocket, type LiveState, type SiteState, type StopRequest } from "./live-socket";
+import {
+  LiveSocket,
+  type LiveState,
+  type SiteState,
+  type StopRequest,
+  tellEach,
+} from "./live-socket";
 import type { Robot } from "./robots";
 import type { Run } from "./runs";
 import { setSites, siteOfId } from "./site-knowledge";
@@ -68,14 +74,23 @@ export class LiveSites implements Live {
 
   /** Sends Stop of a run or group to its site, to all while it is not known which one has it. */
   stop(run: string | "all", id: string = newAid()): void {
+    tellEach(
+      this.#having(run).map(
+        ({ socket }) =>
+          () =>
+            socket.stop(run, id),
+      ),
+    );
+  }
+
+  #having(run: string | "all"): readonly Part[] {
+    if (run === "all") return this.#parts;
     const having = this.#parts.filter(({ socket: { state } }) =>
       [...state.runs.values()].some((each) => each.id === run || each.group === run),
     );
     const known = this.#partOf(siteOfId(run));
-    const chosen = having.length === 0 && known !== undefined ? [known] : having;
-    for (const { socket } of run === "all" || chosen.length === 0 ? this.#parts : chosen) {
-      socket.stop(run, id);
-    }
+    if (having.length > 0) return having;
+    return known === undefined ? this.#parts : [known];
   }
 
   learn(run: Run): void {
@@ -92,14 +107,14 @@ export class LiveSites implements Live {
       if (link === "live") this.#robots.set(site, new Set(engines.map(({ name }) => name)));
     }
     this.state = this.#joined();
-    for (const listener of this.#listeners) listener();
+    tellEach(this.#listeners);
   }
 
   #see(): void {
     const sockets = this.#parts.map(({ socket }) => socket);
     this.runSeenAt = new Map(sockets.flatMap((each) => [...each.runSeenAt]));
     this.robotAnsweredAt = new Map(sockets.flatMap((each) => [...each.robotAnsweredAt]));
-    for (const seer of this.#seers) seer();
+    tellEach(this.#seers);
   }
 
   #joined(): LiveState {

@@ -3,6 +3,7 @@ import { serverNow } from "../clock/server-clock";
 import { sessionEnd } from "./http";
 import { LiveSocket } from "./live-socket";
 import type { Run } from "./runs";
+import "./unreached"; // it is loaded when it is needed, and time stands still here
 
 /** The browser's end of a socket whose other end is the test. */
 class Wire {
@@ -36,7 +37,7 @@ const newest = () => {
 };
 
 const run = (state: string, ended: string | null = null) =>
-  ({ id: "r", number: 1, state, ended_at: ended }) as unknown as Run;
+  ({ id: "r", number: 1, state, ended_at: ended, alarms: [] }) as unknown as Run;
 
 /** A link to a runner in which these runs go on. */
 function opened(...runs: object[]): LiveSocket {
@@ -168,7 +169,6 @@ test("a Stop is heard although the socket fails just then", async () => {
 
 test("a Stop that nobody hears is sent again until somebody does", async () => {
   const live = opened(run("running"));
-  newest().close();
   let dead = true;
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     if (init.method === "POST") posted("POST", url);
@@ -176,6 +176,7 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
     return new Response("{}", { status: 202 });
   });
   live.stop("all");
+  newest().close();
   await vi.advanceTimersByTimeAsync(20_000);
   expect(live.state.stops.at(-1)?.state).toBe("unheard");
   const tries = posted.mock.calls.length;
@@ -242,15 +243,72 @@ test("one run that cannot be stopped now keeps no other from being stopped", asy
   live.open();
   const other = { ...run("running"), id: "q" };
   newest().say({ type: "hello", engines: [], runs: [run("running"), other] });
-  newest().close();
   answering({});
   live.stop("all");
+  newest().close();
   await vi.advanceTimersByTimeAsync(6_000);
   posted.mockReset();
   answering({ "/runs/r/stop": 503, "/runs/q/stop": 202 });
   await vi.advanceTimersByTimeAsync(1_500);
   expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/q/stop");
   expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  live.close();
+});
+
+test("a Stop of everything that is pressed while the runner is silent stays one, and stops what began meanwhile", async () => {
+  const live = opened(run("running"));
+  newest().close(1006);
+  answering({});
+  await vi.advanceTimersByTimeAsync(60_000);
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10_000);
+  posted.mockReset();
+  newest().say({ type: "hello", engines: [], runs: [{ ...run("running"), id: "began" }] });
+  answering({ "/api/stop": 202, "/api/runs/r": [200, run("finished", "2026-01-01T00:00:00Z")] });
+  await vi.advanceTimersByTimeAsync(1_500);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/stop");
+  const [stop] = live.state.stops;
+  expect(stop).toMatchObject({ state: "heard", runs: ["r", "began"] });
+  expect(stop?.provenAt).toBeUndefined();
+  live.close();
+});
+
+test("a Stop of everything that was heard before the runner is seen again is about what it stops", async () => {
+  const live = opened(run("running"));
+  newest().close(1006);
+  await vi.advanceTimersByTimeAsync(60_000);
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops[0]?.state).toBe("heard");
+  await vi.advanceTimersByTimeAsync(20_000);
+  const began = { ...run("stopping"), id: "began", desired: "stopped" };
+  newest().say({ type: "hello", engines: [], runs: [began] });
+  expect(live.state.stops[0]?.runs).toEqual(["r", "began"]);
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  live.close();
+});
+
+test("a listener that fails, and a message that cannot be read, keep no Stop from being sent", () => {
+  const said = vi.spyOn(console, "error").mockImplementation(() => undefined);
+  const live = opened(run("running"));
+  const other = vi.fn();
+  live.subscribe(() => {
+    throw new Error("not drawn");
+  });
+  live.subscribe(other);
+  live.stop("all");
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/stop");
+  expect(other).toHaveBeenCalled();
+  for (const message of [{ type: "engines" }, { type: "engines", engines: [{ name: "David" }] }]) {
+    newest().say(message);
+    expect(live.state).toMatchObject({ link: "down", unreached: { kind: "mute" }, engines: [] });
+    live.stop("all");
+    live.redial();
+    newest().say({ type: "hello", engines: [], runs: [] });
+  }
+  expect(posted.mock.calls.filter(([, url]) => url === "http://h:1/api/stop")).toHaveLength(3);
+  expect(said).toHaveBeenCalled();
+  said.mockRestore();
   live.close();
 });
 

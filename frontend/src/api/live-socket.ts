@@ -5,12 +5,12 @@ import { runnerOnlyAt } from "./client";
 import type { AskedConfirmation } from "./confirmations";
 import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
 import { isPieceOf } from "./led-runs";
-import { pageUrl } from "./page-url";
+import { isBlocked } from "./page-url";
 import type { HeldGraph, Robot } from "./robots";
 import { postStop } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
-import type { Site } from "./sites";
+import { isFurtherSite, type Site, siteOfId } from "./sites";
 
 export type LiveLink = "connecting" | "live" | "down";
 
@@ -25,6 +25,8 @@ export interface StopRequest {
    * that the runner has stopped since.
    */
   runs: readonly string[];
+  /** Set if the runs are all that "all" is about, so that it can be narrowed to them. */
+  whole?: boolean;
   /**
    * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
    * `heard`: the runner is stopping; `refused`: it will not.
@@ -70,6 +72,7 @@ const AGAIN = 1_000; // ms between two tries to send a Stop
 const SOON = 5_000; // ms; the longest wait for another try to reach the runner
 const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
 const TOGETHER = 100; // ms in which news of runs are told together, unless they are urgent
+const FRESH = 1_500; // ms since a message within which the page has seen what goes on
 const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
@@ -100,6 +103,8 @@ export class LiveSocket {
   /** News of runs that listeners are told of soon. */
   #untold: ReturnType<typeof setTimeout> | undefined;
   #toldAt = 0; // tick
+  /** The tick of the last message. */
+  #heardAt = 0;
   /** Reason why the last socket did not open. */
   #unreached: UnreachableReason | null = null;
 
@@ -147,32 +152,28 @@ export class LiveSocket {
    * hears it, it is sent again for as long as the page is open.
    */
   stop(run: string | "all", id: string = newAid()): void {
-    const open = [...this.state.runs.values()].filter((each) => each.ended_at === null);
-    const runs = run === "all" ? open.map((each) => each.id) : [];
-    const stop: StopRequest = {
-      id,
-      run,
-      at: tick(),
-      runs,
-      state: "asked",
-      detail: "",
-    };
+    const first = this.#sendStop(run, id); // before all else: nothing that fails here keeps it back
+    const runs = run === "all" ? openRuns(this.state).map((each) => each.id) : [];
+    const whole = this.#isWhole(runs);
+    const stop: StopRequest = { id, run, at: tick(), runs, whole, state: "asked", detail: "" };
+    void this.#keepStopping(stop, first);
     this.#putStop(stop);
-    void this.#keepStopping(stop, this.#isWhole(runs));
   }
 
   /**
-   * Return whether these are all runs that could be seen to move when a person asked to stop all.
+   * Return whether these are all runs that could be seen to move when a person asked to stop all. What
+   * began while the runner was not heard is seen by nobody here.
    */
   #isWhole(runs: readonly string[]): boolean {
-    return runs.length > 0 && foreignGraphs(this.state).length === 0;
+    const seen = this.state.link === "live" && tick() - this.#heardAt < FRESH;
+    return seen && runs.length > 0 && foreignGraphs(this.state).length === 0;
   }
 
-  /** `whole`: its runs are all that it is about, so that it can be narrowed to them. */
-  async #keepStopping({ id, run, at, runs }: StopRequest, whole: boolean): Promise<void> {
-    for (;;) {
-      const late = run === "all" && whole && tick() - at > ALL_HOLDS;
-      const sent = (late ? runs : [run]).map((each) => this.#sendStop(each, id));
+  async #keepStopping(
+    { id, run, at, runs, whole }: StopRequest,
+    first: Promise<unknown>,
+  ): Promise<void> {
+    for (let sent = [first]; ; ) {
       const errors = (await Promise.allSettled(sent)).flatMap((each) =>
         each.status === "rejected" ? [each.reason as unknown] : [],
       );
@@ -182,6 +183,8 @@ export class LiveSocket {
       const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
       await new Promise((done) => setTimeout(done, AGAIN));
+      const late = run === "all" && whole && tick() - at > ALL_HOLDS;
+      sent = (late ? runs : [run]).map((each) => this.#sendStop(each, id));
     }
   }
 
@@ -217,10 +220,9 @@ export class LiveSocket {
   #connect(): void {
     clearTimeout(this.#again);
     if (this.#closed) return;
-    const barred = blockedByBrowser(this.#runner);
-    if (barred !== null) {
-      this.#unreached = barred;
+    if (isBlocked(this.#runner)) {
       this.#down();
+      void this.#findOut();
       return;
     }
     const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
@@ -233,11 +235,24 @@ export class LiveSocket {
     socket.onmessage = (event) => {
       opened = true;
       this.#expect(socket);
-      this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
+      try {
+        this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
+        this.#heardAt = tick();
+      } catch (error) {
+        // What goes on there is not known any more, until a whole account of it comes.
+        console.error("A message of the runner cannot be read:", error, event.data);
+        this.#unreached = { kind: "mute", why: "What the runner says cannot be read." };
+        this.#lost(socket, true);
+        socket.close();
+      }
     };
     socket.onclose = ({ code }) => {
-      if (code === SESSION_ENDED) sessionEnd.notice();
-      this.#lost(socket, opened);
+      const ended = code === SESSION_ENDED;
+      const further = isFurtherSite(`${this.#runner}/`);
+      // A further site that does not know the session ends it nowhere else.
+      if (ended && further) void isSignedIn();
+      else if (ended) sessionEnd.notice();
+      this.#lost(socket, opened && !(ended && further));
     };
   }
 
@@ -273,7 +288,10 @@ export class LiveSocket {
   /** A browser does not tell why a socket did not open. */
   async #findOut(): Promise<void> {
     const turn = this.#again;
-    const found = await findUnreachableReason(this.#runner);
+    const found = await import("./unreached").then(
+      ({ findUnreachableReason }) => findUnreachableReason(this.#runner),
+      (): UnreachableReason => ({ kind: "silent", why: "The runner does not answer." }),
+    );
     if (this.#closed || this.state.link === "live" || turn !== this.#again) return;
     this.#unreached = found;
     this.#set({ unreached: found });
@@ -281,6 +299,7 @@ export class LiveSocket {
   }
 
   #hear(message: RunnerMessage): void {
+    check(message);
     switch (message.type) {
       case "hello": {
         this.#tries = 0;
@@ -293,10 +312,8 @@ export class LiveSocket {
           runs.delete(id);
           runnerOnlyAt(this.#runner)
             .get("/api/runs/{run}", { path: { run: id } })
-            .then(
-              (ended) => this.#putRun(ended),
-              (error: Error) => console.warn("A run's end is not known", id, error.message),
-            );
+            .then((ended) => this.#hear({ type: "run", run: ended }))
+            .catch((error: Error) => console.warn("A run's end is not known", id, error.message));
         }
         for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
         this.#joinStops(message.runs);
@@ -338,7 +355,7 @@ export class LiveSocket {
         if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
         this.runSeenAt = seen;
         this.robotAnsweredAt = heard;
-        for (const seer of this.#seers) seer();
+        tellEach(this.#seers);
         break;
       }
     }
@@ -367,9 +384,13 @@ export class LiveSocket {
 
   #answerStop(id: string, state: StopRequest["state"], detail: string): void {
     const heard = state === "heard" && { heardAt: tick() };
-    const stops = this.state.stops.map((stop) =>
-      stop.id === id && stop.state !== "heard" ? { ...stop, state, detail, ...heard } : stop,
-    );
+    const stops = this.state.stops.map((stop) => {
+      if (stop.id !== id || stop.state === "heard") return stop;
+      // What began until it was heard is stopped by it as well.
+      const late = heard && stop.run === "all" && !stop.whole && tick() - stop.at > AGAIN;
+      const more = late ? openRuns(this.state).map((run) => run.id) : [];
+      return { ...stop, state, detail, ...heard, runs: [...new Set([...stop.runs, ...more])] };
+    });
     this.#set({ stops });
   }
 
@@ -377,11 +398,14 @@ export class LiveSocket {
   #joinStops(told: readonly Run[]): void {
     const stopping = told.filter((run) => run.ended_at === null && run.desired === "stopped");
     if (stopping.length === 0) return;
+    const { link, since } = this.state;
     const stops = this.state.stops.map((stop) => {
-      const { heardAt = Number.POSITIVE_INFINITY } = stop;
-      if (stop.run !== "all" || tick() - heardAt > JOINS) return stop;
+      const { heardAt, provenAt: _, ...rest } = stop;
+      if (stop.run !== "all" || heardAt === undefined) return stop;
+      const unseen = link !== "live" && heardAt >= since; // this is the first that is seen since
+      if (!unseen && tick() - heardAt > JOINS) return stop;
       const more = stopping.map(({ id }) => id).filter((id) => !stop.runs.includes(id));
-      return more.length === 0 ? stop : { ...stop, runs: [...stop.runs, ...more] };
+      return more.length === 0 ? stop : { ...rest, heardAt, runs: [...stop.runs, ...more] };
     });
     this.state = { ...this.state, stops };
   }
@@ -406,8 +430,30 @@ export class LiveSocket {
     clearTimeout(this.#untold);
     this.#untold = undefined;
     this.#toldAt = tick();
-    for (const listener of this.#listeners) listener();
+    tellEach(this.#listeners);
   }
+}
+
+/** No listener that fails keeps another one, or what comes after, from its turn. */
+export function tellEach(listeners: Iterable<() => void>): void {
+  for (const listener of listeners) {
+    try {
+      listener();
+    } catch (error) {
+      console.error("News of a runner are not shown:", error);
+    }
+  }
+}
+
+/** Throws an error if a message lacks what each robot and each run has. */
+function check(message: RunnerMessage): void {
+  const { type } = message;
+  const robots = type === "hello" || type === "engines" ? message.engines : [];
+  const runs = type === "hello" ? message.runs : type === "run" ? [message.run] : [];
+  const isSound =
+    robots.every(({ name, holds }) => typeof name === "string" && Array.isArray(holds)) &&
+    runs.every(({ id, alarms }) => typeof id === "string" && Array.isArray(alarms));
+  if (!isSound) throw new TypeError("It lacks a part.");
 }
 
 /** Moments of the server's clock by name, ms since 1970. */
@@ -471,9 +517,16 @@ export function openRuns(now: LiveState): Run[] {
   return [...now.runs.values()].filter((run) => run.ended_at === null).sort(byAge(now));
 }
 
-/** Return the site that has a run, as far as the page has heard of the run live. */
+/**
+ * Return the site that has a run; one of those of which nothing is known now, if there is one, while it is not
+ * known which has it.
+ */
 export function siteWith(now: LiveState, run: string): SiteState | undefined {
-  return now.sites?.find(({ state }) => state.runs.has(run));
+  const known = siteOfId(run);
+  return (
+    now.sites?.find(({ site, state }) => state.runs.has(run) || site === known) ??
+    silentSites(now)[0]
+  );
 }
 
 /** Return the state of the site that has a run; `now` with one runner. */
@@ -557,64 +610,4 @@ function isProven(stop: StopRequest, now: LiveState): boolean {
 export interface UnreachableReason {
   readonly kind: "ended" | "strange" | "mute" | "silent";
   readonly why: string;
-}
-
-const PATIENCE = 3_000; // ms
-
-/**
- * Return the reason if browsers block the address: an encrypted page may not load unencrypted
- * content; else null.
- */
-function blockedByBrowser(runner: string): UnreachableReason | null {
-  const encrypted = globalThis.location?.protocol === "https:";
-  if (!encrypted || !runner.startsWith("http:")) return null;
-  return {
-    kind: "strange",
-    why: `This page is encrypted and the runner at ${runner} is not, so the browser blocks the connection. A proxy has to serve both: start the server with --public-url ${pageUrl()}/ and forward everything below runner/ to the runner’s port.`,
-  };
-}
-
-/** Asked after a socket did not open. */
-async function findUnreachableReason(runner: string): Promise<UnreachableReason> {
-  const answer = await asked(`${runner}/api/reach`);
-  if (answer === null)
-    return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
-  if (answer.status === 401) return unknownTo(runner);
-  if (!answer.ok || !/json/.test(answer.headers.get("content-type") ?? "")) {
-    return { kind: "strange", why: await astray(runner, answer) };
-  }
-  return {
-    kind: "mute",
-    why: "The runner answers, but a live connection to it cannot be opened: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
-  };
-}
-
-async function asked(url: string): Promise<Response | null> {
-  const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(PATIENCE) };
-  return fetch(url, init).catch(() => null);
-}
-
-async function unknownTo(runner: string): Promise<UnreachableReason> {
-  const known = await isSignedIn();
-  if (known === "no") return { kind: "ended", why: "Your session has ended." };
-  const here = known === "yes" ? ", though the editor does" : "";
-  return {
-    kind: "strange",
-    why: `The runner at ${runner} does not know your session${here}. The runner needs the editor’s token and the address of this page (behind a proxy: --public-url).`,
-  };
-}
-
-async function astray(runner: string, answer: Response): Promise<string> {
-  const problem: unknown = await answer.json().catch(() => null);
-  const detail = (problem as { detail?: unknown } | null)?.detail;
-  if (typeof detail === "string") return detail;
-  return `The program that answers at ${runner} is not the runner (${answer.status}): the proxy has to forward this address to the runner’s port.`;
-}
-
-/** A server that was told another host takes this page for one of that host. */
-function stray(runner: string): string {
-  const { hostname } = new URL(runner);
-  const own = globalThis.location?.hostname ?? hostname;
-  if (own === hostname) return "";
-  return ` The server says that it is at ${hostname}, and this page is at ${own}: the proxy has to pass on the Host header, and the server needs --public-url ${pageUrl()}/.`;
 }

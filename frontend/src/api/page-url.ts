@@ -35,3 +35,8 @@ export function pageUrl(): string {
 export function helpUrl(place: string): string {
   return serverPath(`/help/${place}`);
 }
+
+/** Return whether browsers block the address: an encrypted page may not load unencrypted content. */
+export function isBlocked(runner: string): boolean {
+  return globalThis.location?.protocol === "https:" && runner.startsWith("http:");
+}

@@ -162,3 +162,19 @@ test("Stop of a robot goes to each site that may have it", async () => {
   await stop("Dora");
   expect(asked.map((each) => each.slice(5, 9))).toEqual(["8011", "8001", "8011", "8001", "8011"]);
 });
+
+test("Stop of a robot goes to a site that has not said its robots as well", async () => {
+  answers = { "POST 8011": {}, "POST 8001": new TypeError("refused") };
+  robots.set(A, null);
+  await runner.post("/api/robots/{name}/stop", { path: { name: "Dora" } });
+  expect(asked.map((each) => each.slice(5, 9)).sort()).toEqual(["8001", "8011"]);
+});
+
+test("a session that one site does not know any more has ended there", async () => {
+  vi.stubGlobal("fetch", async (url: string) =>
+    url.startsWith(A.url)
+      ? Response.json({ status: 401, type: "unauthenticated" }, { status: 401 })
+      : new Response(null, { status: 204 }),
+  );
+  await expect(runner.delete("/api/session", {})).resolves.toBeUndefined();
+});

@@ -15,7 +15,6 @@ const SIMULATOR = "simulator"; // each runner has one
 
 /** Requests by which runners learn something: each has to. */
 const TOLD = new Set([
-  "delete /api/session",
   "post /api/sessions/ended",
   "post /api/revocations",
   "put /api/members/{person}",
@@ -55,6 +54,7 @@ const OF_ROBOTS = new Set([
 
 /** Send a request to the site or sites that it is meant for. */
 const askSites: SiteRouter["ask"] = async (route, sent, ask) => {
+  if (route === "delete /api/session") return tellAll(allSites(), ended(ask));
   if (TOLD.has(route)) return tellAll(allSites(), ask);
   if (route === "post /api/robots/{name}/stop") return stopRobot(String(sent.path?.name), ask);
   if (route === "get /api/runs") return listRuns(sent, ask);
@@ -98,10 +98,22 @@ async function tellAll(sites: readonly Site[], ask: AskSite): Promise<unknown> {
   throw new Error(`${names.join(", ")}: ${errors.map(({ message }) => message).join(" ")}`);
 }
 
+/** A session that a site does not know any more has ended there. */
+function ended(ask: AskSite): AskSite {
+  return (site) =>
+    ask(site).catch((error) => {
+      if (!(error instanceof Refusal) || error.details.status !== 401) throw error;
+    });
+}
+
 /** No doubt about where a robot is keeps a Stop from it: each site that may have it gets one. */
-function stopRobot(robot: string, ask: AskSite): Promise<unknown> {
+async function stopRobot(robot: string, ask: AskSite): Promise<unknown> {
   const having = sitesOfRobot(robot);
-  return tellAll(having.length > 0 ? having : allSites(), ask);
+  if (having.length === 0) return tellAll(allSites(), ask);
+  const perhaps = mutedSites().map((site) => ask(site));
+  const told = tellAll(having, ask);
+  await Promise.allSettled([told, ...perhaps]);
+  return told;
 }
 
 interface Answer {

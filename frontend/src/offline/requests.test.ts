@@ -54,3 +54,13 @@ test("the version of a page is read from what the server sends", () => {
   expect(versionIn('<head><meta name="build" content="abc123" /></head>')).toBe("abc123");
   expect(versionIn("<!doctype html>")).toBe("");
 });
+
+test("what another runner serves below the public address is no page of it", () => {
+  const at = (path: string) =>
+    handlingOf(
+      { method: "GET", mode: "navigate", url: `https://x/temoto/${path}` },
+      "https://x/temoto/",
+    );
+  expect(at("hall-b/api/runs/a/export?format=jsonl")).toBe("pass");
+  expect(at("runs/api")).toBe("page");
+});

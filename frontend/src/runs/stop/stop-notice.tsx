@@ -2,7 +2,7 @@
 
 import { useLayoutEffect, useRef, useState } from "react";
 import { engineWords } from "../../api/led-runs";
-import type { LiveState, StopRequest } from "../../api/live-socket";
+import type { LiveState, SiteState, StopRequest } from "../../api/live-socket";
 import {
   foreignGraphs,
   openRuns,
@@ -35,6 +35,8 @@ export type StopNoticeText = {
   text: string;
   since?: string;
   stays?: true;
+  /** The loud notices of which it consists, where there are several sites. */
+  loud?: readonly { text: string }[];
 } | null;
 
 /** Return the runner's reason why the Stop is not proven; "" before it has given one. */
@@ -76,6 +78,9 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const down = now.link === "down";
   const isKnown = stop.provenAt !== undefined || (stop.run !== "all" && runs.length > 0);
   if (down && (open.length > 0 || !isKnown)) return silentNotice(runs, since);
+  if (now.link === "connecting" && !isKnown) {
+    return waited < LOUD ? { tone: "quiet", text: "Stop sent", since } : silentNotice(runs, since);
+  }
   if (open.length > 0) {
     if (waited >= LOUD) return unconfirmed(open, since);
     const names = open.map((run) => `run ${run.number}`).join(", ");
@@ -93,6 +98,7 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   if (at - (stop.provenAt ?? stop.at) > GONE) return null;
   if (stop.state === "asked") return { tone: "quiet", text: "Stop", since };
   if (down) return provenNotice(runs, stop.provenAt, now);
+  if (runs.length === 0 && openRuns(now).length > 0) return null; // begun since
   return doneNotice(runs, stop.run === "all" ? unheardRobots(now) : []);
 }
 
@@ -200,6 +206,18 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   return { tone: "loud", stays: true, text };
 }
 
+/**
+ * Return the state of a site without the Stops that are none of its: a run is at one site, and the others
+ * refuse a Stop of it.
+ */
+export function withOwnStops(now: LiveState, sites: readonly SiteState[]): LiveState {
+  const isElsewhere = ({ id, run, state: said }: StopRequest) =>
+    said === "refused" &&
+    run !== "all" &&
+    sites.some(({ state }) => state.stops.some((stop) => stop.id === id && stop.state !== said));
+  return { ...now, stops: now.stops.filter((stop) => !isElsewhere(stop)) };
+}
+
 /** Return the notice of one runner. `dismissed`: the ids of the Stops of which nobody wants to hear more. */
 function runnerNotice(now: LiveState, dismissed: ReadonlySet<string>, at: number): StopNoticeText {
   const last = now.stops.at(-1);
@@ -221,9 +239,17 @@ export function noticeOfSites(
   const told = TONES.flatMap((tone) => parts.filter(({ notice }) => notice?.tone === tone));
   const [first] = told;
   if (first === undefined || first.notice === null) return null;
-  const text = told.map(({ name, notice }) => atSite(notice?.text ?? "", isolated(name))).join(" ");
+  const said = told.map(({ name, notice }) => ({
+    text: atSite(notice?.text ?? "", isolated(name)),
+  }));
   const stays = told.some(({ notice }) => notice?.stays);
-  return { ...first.notice, text, ...(stays && { stays }) };
+  const loud = said.filter((_, i) => told[i]?.notice?.tone === "loud");
+  return {
+    ...first.notice,
+    text: said.map(({ text }) => text).join(" "),
+    ...(stays && { stays }),
+    ...(loud.length > 1 && { loud }),
+  };
 }
 
 function atSite(text: string, site: string): string {
@@ -256,21 +282,22 @@ function RobotLines({ run, unheard, named }: { run: Run; unheard: boolean; named
   );
 }
 
-type ShownNotice = NonNullable<StopNoticeText>;
+type Told = Pick<NonNullable<StopNoticeText>, "text" | "loud">;
 
 /**
  * Return the headline that stays visible when the notice is minimized, such as STOP UNCONFIRMED.
  */
-export function headOf({ text }: ShownNotice): string {
-  return text.split(":", 1)[0] ?? text;
+export function headOf({ text, loud = [{ text }] }: Told): string {
+  return loud.map((part) => part.text.split(":", 1)[0]).join(" · ");
 }
 
 /**
  * Return a key by which a minimized notice stays minimized while its text is the same; a new text
  * opens it again.
  */
-export function noticeKey({ text }: ShownNotice): string {
-  return `${headOf({ tone: "loud", text })} ${(text.match(/run \d+/g) ?? []).sort().join(" ")}`;
+export function noticeKey({ text, loud = [{ text }] }: Told): string {
+  const keys = loud.map((part) => [headOf(part), ...(part.text.match(/run \d+/g) ?? []).sort()]);
+  return keys.flat().join(" ");
 }
 
 /**
@@ -340,7 +367,7 @@ export function StopNotice() {
       : noticeOfSites(
           now.sites.map(({ site: { name }, state }) => ({
             name,
-            notice: runnerNotice(state, dismissed, at),
+            notice: runnerNotice(withOwnStops(state, now.sites ?? []), dismissed, at),
           })),
         );
   const aside = useAside(notice, last?.id ?? "");
