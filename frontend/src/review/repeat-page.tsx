@@ -5,6 +5,7 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
 import { errorText, unconfirmed } from "../api/http";
+import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import {
@@ -22,6 +23,7 @@ import type { DurationBounds, Run } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/progress";
 import { SecondPerson } from "../status/second-person";
+import { SilentSites } from "../status/silent-sites";
 import { StateLabel } from "../status/state-label";
 import { lineWords, valueLines } from "../status/value-words";
 import { useWatching, WatchTicks } from "../status/watching";
@@ -273,7 +275,7 @@ export function RepeatPage({ id, bar }: PageProps & { id: string }) {
 }
 
 export function RepeatsPage({ bar }: PageProps) {
-  const { runner } = useLive();
+  const { runner, now: live } = useLive();
   const found = useRepeats(runner);
   const now = useNow(60_000);
   return (
@@ -292,7 +294,8 @@ export function RepeatsPage({ bar }: PageProps) {
               {errorText(found.error)}
             </Empty>
           )}
-          {found.data?.length === 0 && (
+          <SilentSites missing="what is repeated there" />
+          {found.data?.length === 0 && silentSites(live).length === 0 && (
             <Empty icon={<IconRepeat size={22} />} title="Nothing was repeated yet">
               Choose <b>Repeat it</b> before a start: several times, or with each of several values.
             </Empty>
