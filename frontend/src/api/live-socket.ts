@@ -11,6 +11,7 @@ import { postStop } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 import { isFurtherSite, type Site, siteOfId } from "./sites";
+import type { UnreachableReason } from "./unreached";
 
 export type LiveLink = "connecting" | "live" | "down";
 
@@ -601,13 +602,4 @@ function isProven(stop: StopRequest, now: LiveState): boolean {
   if (runs.some((run) => run.ended_at === null || run.state === "lost")) return false;
   if (stop.run !== "all") return runs.length > 0;
   return foreignGraphs(now).length === 0 && unheardRobots(now).length === 0;
-}
-
-/**
- * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,
- * so a Stop arrives, but what becomes of it is not seen.
- */
-export interface UnreachableReason {
-  readonly kind: "ended" | "strange" | "mute" | "silent";
-  readonly why: string;
 }

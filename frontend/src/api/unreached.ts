@@ -1,7 +1,15 @@
 /** Finds out why a runner is not reached. Loaded then: STOP does not wait for it. */
 import { isSignedIn } from "./http";
-import type { UnreachableReason } from "./live-socket";
 import { isBlocked, pageUrl } from "./page-url";
+
+/**
+ * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,
+ * so a Stop arrives, but what becomes of it is not seen.
+ */
+export interface UnreachableReason {
+  readonly kind: "ended" | "strange" | "mute" | "silent";
+  readonly why: string;
+}
 
 const PATIENCE = 3_000; // ms
 
