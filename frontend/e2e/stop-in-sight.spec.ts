@@ -110,7 +110,9 @@ async function noticeOverDialog(page: Page): Promise<void> {
   await page.setViewportSize(PHONE.viewport);
   await page.getByRole("button", { name: /^You are / }).tap();
   await page.getByRole("button", { name: "Share with others …" }).tap();
-  const [dialog, notice] = [page.getByRole("dialog", { name: "Share" }), page.getByRole("alert")];
+  const dialog = page.getByRole("dialog", { name: "Share" });
+  // Messages of the graph that is still being arranged are alerts, too.
+  const notice = page.getByRole("region", { name: "Stop" }).getByRole("alert");
   await expect(notice).toContainText("STOP MAY REACH NOBODY");
   const over = async () => {
     const [box, said] = [await dialog.boundingBox(), await notice.boundingBox()];
