@@ -1,4 +1,4 @@
-"""What a large lab asks of one installation: simulated days, and what their edits and runs cost here."""
+"""Simulates days of a large lab, and measures what their edits and runs cost."""
 
 import asyncio
 import bisect

@@ -14,7 +14,7 @@ from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from support.command_line import ran
 from support.product import Product
-from support.two_sites import HALL_A, HALL_B, SecondRunner, two_sites
+from support.two_sites import HALL_A, HALL_B, SecondRunner, frozen, two_sites
 
 ENDLESS = {"behaviours": {"*": [{"never": True}]}}
 GRAPH = {
@@ -178,13 +178,9 @@ def test_both_are_stopped_without_the_editor(halls: Halls) -> None:
     product, second = halls
     with product.runner() as first, second.client() as other:
         runs = started_at(first, "left"), started_at(other, "right")
-        editor = product.process("editor")
-        editor.suspend()
-        try:
+        with frozen(product.process("editor")):
             environ = {**product.environment, "ACTION_ASSISTANT_URL": ""}
             stopped = ran("stop", "--all", "--data", str(product.data), environ=environ)
-        finally:
-            editor.resume()
         assert stopped.returncode == 0, stopped.stderr
         assert (state(first, runs[0]), state(other, runs[1])) == ("stopped", "stopped")
 

@@ -11,7 +11,7 @@ from action_assistant.commands.stored_tokens import StoredToken, file_of
 from commands.test_sites import Halls, started_at, state
 from support.command_line import ran
 from support.product import Product
-from support.two_sites import HALL_A, HALL_B, two_sites
+from support.two_sites import HALL_A, HALL_B, frozen, two_sites
 
 NOT_KNOWN = "NOT KNOWN whether there are further runners"
 
@@ -38,15 +38,11 @@ def test_a_silent_editor_that_names_no_runners_leaves_a_stop_of_all_in_doubt(
     where = str(product.port) if named == "--port" else product.url
     with product.runner() as first, second.client() as other:
         here, there = started_at(first, f"a{named}"), started_at(other, f"b{named}")
-        editor = product.process("editor")
-        editor.suspend()
-        try:
+        with frozen(product.process("editor")):
             environ = away(product, tmp_path)
             everything = ran("stop", "--all", named, where, environ=environ)
             one = ran("stop", here, named, where, environ=environ)
             elsewhere = ran("stop", there, named, where, environ=environ)
-        finally:
-            editor.resume()
         assert everything.returncode == 1
         assert everything.stdout == "stopped\n"
         assert NOT_KNOWN in everything.stderr
@@ -64,13 +60,9 @@ def test_a_silent_editor_of_a_known_folder_leaves_no_runner_out(
     product, second = halls
     with product.runner() as first, second.client() as other:
         runs = started_at(first, "folder a"), started_at(other, "folder b")
-        editor = product.process("editor")
-        editor.suspend()
-        try:
+        with frozen(product.process("editor")):
             environ = away(product, tmp_path, ACTION_ASSISTANT_DATA=str(product.data))
             stopped = ran("stop", "--all", "--port", str(product.port), environ=environ)
-        finally:
-            editor.resume()
         assert (stopped.returncode, stopped.stderr) == (0, "")
         assert (state(first, runs[0]), state(other, runs[1])) == ("stopped", "stopped")
 
@@ -88,12 +80,8 @@ def test_a_login_that_is_older_than_a_runner_does_not_call_everything_stopped(
     path.chmod(0o600)
     with second.client() as other:
         there = started_at(other, "newer than the login")
-        editor = product.process("editor")
-        editor.suspend()
-        try:
+        with frozen(product.process("editor")):
             stopped = ran("stop", "--all", "--url", product.url, environ=environ)
-        finally:
-            editor.resume()
         assert stopped.returncode == 1
         assert NOT_KNOWN in stopped.stderr
         assert "the runners of the login" in stopped.stderr

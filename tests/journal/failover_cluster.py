@@ -2,12 +2,9 @@
 
 import contextlib
 import json
-import os
 import shutil
 import signal
-import socket
 import subprocess
-import tempfile
 import time
 import urllib.error
 import urllib.request
@@ -18,6 +15,7 @@ from typing import Any, Final
 import psutil
 
 from journal import servers
+from support.product import free_ports
 
 NODES: Final = ("one", "two")
 _SCOPE: Final = "lab"
@@ -36,9 +34,9 @@ class Node:
 
     def __init__(self, home: Path, name: str, etcd: int) -> None:
         self.name: Final = name
-        self.port: Final = _free_port()
+        self.port: Final = free_ports()
         self._home: Final = home
-        self._rest_port: Final = _free_port()
+        self._rest_port: Final = free_ports()
         self.rest: Final = f"http://127.0.0.1:{self._rest_port}"
         self._patroni: subprocess.Popen[bytes] | None = None
         bin_ = servers.binaries()
@@ -124,14 +122,14 @@ class Cluster:
 
     def __init__(self, home: Path) -> None:
         self.home: Final = home
-        self._etcd_port: Final = _free_port()
+        self._etcd_port: Final = free_ports()
         self.nodes: Final = tuple(Node(home, name, self._etcd_port) for name in NODES)
         self._etcd: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
         """Start everything, and wait for a primary with a synchronous replica."""
         client = f"http://127.0.0.1:{self._etcd_port}"
-        peer = f"http://127.0.0.1:{_free_port()}"
+        peer = f"http://127.0.0.1:{free_ports()}"
         with (self.home / "etcd.log").open("ab") as log:
             self._etcd = _run(
                 [
@@ -184,30 +182,7 @@ class Cluster:
 
     def sql(self, text: str, database: str = "postgres", node: Node | None = None) -> str:
         """Run SQL on a node, or else on the primary, and return what it prints."""
-        bin_ = servers.binaries()
-        assert bin_ is not None
-        return subprocess.run(
-            [
-                str(bin_ / "psql"),
-                "-qAt",
-                "-v",
-                "ON_ERROR_STOP=1",
-                "-h",
-                "127.0.0.1",
-                "-p",
-                str((node or self.primary()).port),
-                "-U",
-                "aa",
-                "-d",
-                database,
-                "-c",
-                text,
-            ],
-            check=True,
-            capture_output=True,
-            text=True,
-            timeout=60,
-        ).stdout.strip()
+        return servers.answer((node or self.primary()).port, text, database)
 
     def configure(self, **settings: Any) -> None:
         """Change Patroni's settings of the whole cluster; None removes one."""
@@ -245,9 +220,7 @@ class Cluster:
 @contextlib.contextmanager
 def cluster() -> Iterator[Cluster]:
     """A cluster that runs, and is gone afterwards."""
-    home = Path(tempfile.mkdtemp(prefix="aa-cluster-"))
-    if os.geteuid() == 0:
-        os.chown(home, servers.NOBODY, servers.NOBODY)
+    home = servers.own_folder("aa-cluster-")
     one = Cluster(home)
     try:
         one.start()
@@ -258,27 +231,15 @@ def cluster() -> Iterator[Cluster]:
 
 
 def _run(command: list[str], home: Path, log: Any) -> subprocess.Popen[bytes]:
-    user = (
-        {"user": servers.NOBODY, "group": servers.NOBODY, "extra_groups": []}
-        if os.geteuid() == 0
-        else {}
-    )
     return subprocess.Popen(
         command,
         cwd=home,
-        env={"PATH": os.environ["PATH"], "LC_ALL": "C", "HOME": str(home)},
+        env=servers.environment(home),
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=log,
-        **user,  # type: ignore[call-overload]
+        **servers.nobody(),
     )
-
-
-def _free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port: int = free.getsockname()[1]
-        return port
 
 
 def _asked(url: str) -> dict[str, Any] | None:

@@ -3,16 +3,17 @@
 import contextlib
 import os
 import shutil
-import socket
 import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import psutil
 
-NOBODY: Final = 65534
+from support.product import free_ports
+
+_NOBODY: Final = 65534
 _SETTINGS: Final = {
     "listen_addresses": "127.0.0.1",
     "unix_socket_directories": "",
@@ -21,6 +22,25 @@ _SETTINGS: Final = {
     "fsync": "on",
     "synchronous_commit": "on",
 }
+
+
+def nobody() -> dict[str, Any]:
+    """Return the arguments of a process that must not be root's."""
+    root = os.geteuid() == 0
+    return {"user": _NOBODY, "group": _NOBODY, "extra_groups": []} if root else {}
+
+
+def environment(home: Path) -> dict[str, str]:
+    """Return the environment of a process whose home is a folder of the test."""
+    return {"PATH": os.environ["PATH"], "LC_ALL": "C", "HOME": str(home)}
+
+
+def own_folder(prefix: str) -> Path:
+    """Make a folder that such a process may write."""
+    folder = Path(tempfile.mkdtemp(prefix=prefix))
+    if os.geteuid() == 0:
+        os.chown(folder, _NOBODY, _NOBODY)
+    return folder
 
 
 def binaries() -> Path | None:
@@ -44,7 +64,7 @@ class Server:
         self._home = folder
         self._databases = 0
         self._data = folder / "data"
-        self.port: int = _free_port()
+        self.port: int = free_ports()
         self.run("initdb", "-D", str(self._data), "-U", "aa", "-A", "trust", "-E", "UTF8",
                   "--locale=C", "--no-instructions", "--no-sync")  # fmt: skip
         lines = "".join(f"{name} = '{value}'\n" for name, value in _SETTINGS.items())
@@ -77,7 +97,7 @@ class Server:
 
     def ask(self, text: str, database: str = "postgres") -> str:
         """Return what SQL answers."""
-        return _answer(self._bin, self.port, text, database)
+        return answer(self.port, text, database)
 
     def sql(self, text: str, database: str = "postgres") -> None:
         """Run SQL as the owner."""
@@ -112,16 +132,15 @@ class Server:
 
     def run(self, program: str, *arguments: str) -> None:
         """Run a program of Postgres as the user of this server."""
-        user = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
         subprocess.run(
             [str(self._bin / program), *arguments],
             check=True,
             cwd=self._home,
-            env={"PATH": os.environ["PATH"], "LC_ALL": "C", "HOME": str(self._home)},
+            env=environment(self._home),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             timeout=90,
-            **user,  # type: ignore[call-overload]
+            **nobody(),
         )
 
 
@@ -131,7 +150,7 @@ class Replica:
     def __init__(self, primary: Server) -> None:
         self._primary = primary
         self._data = primary.home / "replica"
-        self.port: int = _free_port()
+        self.port: int = free_ports()
         primary.run("pg_basebackup", "-D", str(self._data), "-R", "-h", "127.0.0.1",
                     "-p", str(primary.port), "-U", "aa", "-c", "fast")  # fmt: skip
         with (self._data / "postgresql.conf").open("a") as file:
@@ -140,7 +159,7 @@ class Replica:
 
     def ask(self, text: str, database: str = "postgres") -> str:
         """Return what SQL answers."""
-        return _answer(self._primary.binaries, self.port, text, database)
+        return answer(self.port, text, database)
 
     def promote(self) -> None:
         """Let it take over."""
@@ -172,19 +191,18 @@ class Replica:
         )
 
 
-def _answer(bin_: Path, port: int, text: str, database: str) -> str:
+def answer(port: int, text: str, database: str = "postgres") -> str:
+    """Return what the server at a port answers to SQL."""
+    bin_ = binaries()
+    assert bin_ is not None
+    where = ["-h", "127.0.0.1", "-p", str(port), "-U", "aa", "-d", database]
     return subprocess.run(
-        [str(bin_ / "psql"), "-qAt", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(port),
-         "-U", "aa", "-d", database, "-c", text],
-        check=True, capture_output=True, text=True, timeout=60,
-    ).stdout.strip()  # fmt: skip
-
-
-def _free_port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port: int = free.getsockname()[1]
-        return port
+        [str(bin_ / "psql"), "-qAt", "-v", "ON_ERROR_STOP=1", *where, "-c", text],
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    ).stdout.strip()
 
 
 @contextlib.contextmanager
@@ -192,10 +210,8 @@ def server() -> Iterator[Server]:
     """A server that runs, and is gone afterwards."""
     bin_ = binaries()
     assert bin_ is not None
-    folder = Path(tempfile.mkdtemp(prefix="aa-postgres-"))
+    folder = own_folder("aa-postgres-")
     try:
-        if os.geteuid() == 0:
-            os.chown(folder, NOBODY, NOBODY)
         one = Server(folder, bin_)
         one.start()
         try:

@@ -126,7 +126,7 @@ async def test_a_commit_whose_wait_for_the_replica_was_cancelled_is_not_acknowle
 async def test_writer_and_readers_leave_an_old_primary_that_lives_on(
     replicated: tuple[Server, Replica], patroni: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Somebody promotes the replica by force, while the old primary still confirms commits alone."""
+    """The replica is promoted by force, while the old primary still confirms commits alone."""
     monkeypatch.setattr(failover, "_WATCH_S", 0.2)
     primary, replica = replicated
     STATE.update(

@@ -7,6 +7,7 @@ import signal
 import time
 from collections import Counter
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -67,8 +68,7 @@ async def test_failovers_under_load_lose_nothing_that_was_confirmed(
         await asyncio.sleep(chance.uniform(0.5, 1.5))
         primary = nodes.primary()
         await (lose_power, freeze)[turn % 2](nodes, primary)
-        before = len(writing.acknowledged)
-        await until(lambda count=before: len(writing.acknowledged) > count + 8, within=60)  # type: ignore[misc]
+        await writing.go_on(8, within=60)
         if turn % 2 == 0:
             primary.start()
         await asyncio.to_thread(nodes.wait_for_replica)
@@ -136,6 +136,9 @@ async def test_an_editor_with_people_goes_on_at_the_replica(
         told: dict[str, set[str]] = {graph: set() for graph in graphs}
         over = asyncio.Event()
 
+        def is_more(before: int) -> bool:
+            return sum(map(len, told.values())) > before
+
         async def edit(person: int, graph: str) -> None:
             hand, n = Hand(editor, graph, patience=120), 0
             while not over.is_set():
@@ -152,8 +155,7 @@ async def test_an_editor_with_people_goes_on_at_the_replica(
                 began = time.monotonic()
                 await (lose_power, freeze)[turn % 2](nodes, primary)
                 promoted = time.monotonic() - began
-                before = sum(map(len, told.values()))
-                await until(lambda count=before: sum(map(len, told.values())) > count, within=90)  # type: ignore[misc]
+                await until(partial(is_more, sum(map(len, told.values()))), within=90)
                 print(  # noqa: T201 - a figure of the soak
                     f"promoted after {promoted:.1f} s, stored again after {time.monotonic() - began:.1f} s"
                 )

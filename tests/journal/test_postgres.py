@@ -72,6 +72,11 @@ class Writers:
             self.acknowledged.append(body)
             n += 1
 
+    async def go_on(self, more: int = 1, within: float = 20) -> None:
+        """Wait until so many more were acknowledged."""
+        wanted = len(self.acknowledged) + more
+        await until(lambda: len(self.acknowledged) >= wanted, within)
+
     async def end(self) -> None:
         self._enough = True
         await asyncio.gather(*self._tasks)
@@ -98,8 +103,7 @@ async def test_immediate_stops_under_load_lose_nothing_and_double_nothing(mortal
         await asyncio.sleep(chance.uniform(0.1, 0.5))
         await asyncio.to_thread(mortal.stop, "immediate")
         await asyncio.to_thread(mortal.start)
-        before = len(writing.acknowledged)
-        await until(lambda count=before: len(writing.acknowledged) > count, within=5)  # type: ignore[misc]
+        await writing.go_on(within=5)
     await writing.end()
     assert writing.refused > 0
     await writing.check()

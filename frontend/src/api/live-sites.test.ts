@@ -1,34 +1,10 @@
 /** The live sockets of two sites as one: what is unknown at one hides nothing of the other. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { Wire } from "../testing/wire";
 import { sessionEnd } from "./http";
 import { LiveSites } from "./live-sites";
 import { openRuns, silentRobots, stateOf, unheardRobots } from "./live-socket";
 import { noteSite } from "./site-knowledge";
-
-/** The browser's end of a socket whose other end is the test. */
-class Wire {
-  static readonly OPEN = 1;
-  static all: Wire[] = [];
-  readyState = 1;
-  sent: string[] = [];
-  onmessage: ((event: { data: string }) => void) | null = null;
-  onclose: ((event: { code: number }) => void) | null = null;
-  readonly url: string;
-  constructor(url: string) {
-    this.url = url;
-    Wire.all.push(this);
-  }
-  send(text: string) {
-    this.sent.push(text);
-  }
-  close(code = 1000) {
-    this.readyState = 3;
-    this.onclose?.({ code });
-  }
-  say(message: object) {
-    this.onmessage?.({ data: JSON.stringify(message) });
-  }
-}
 
 const A = { name: "Hall A", url: "http://h:1" };
 const B = { name: "Hall B", url: "http://h:2" };

@@ -1,34 +1,10 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { serverNow } from "../clock/server-clock";
+import { Wire } from "../testing/wire";
 import { sessionEnd } from "./http";
 import { LiveSocket } from "./live-socket";
 import type { Run } from "./runs";
 import "./unreached"; // it is loaded when it is needed, and time stands still here
-
-/** The browser's end of a socket whose other end is the test. */
-class Wire {
-  static readonly OPEN = 1;
-  static all: Wire[] = [];
-  readyState = 1;
-  sent: string[] = [];
-  onmessage: ((event: { data: string }) => void) | null = null;
-  onclose: ((event: { code: number }) => void) | null = null;
-  readonly url: string;
-  constructor(url: string) {
-    this.url = url;
-    Wire.all.push(this);
-  }
-  send(text: string) {
-    this.sent.push(text);
-  }
-  close(code = 1000) {
-    this.readyState = 3;
-    this.onclose?.({ code });
-  }
-  say(message: object) {
-    this.onmessage?.({ data: JSON.stringify(message) });
-  }
-}
 
 const newest = () => {
   const wire = Wire.all.at(-1);

@@ -1,4 +1,4 @@
-"""What was stopped or closed is remembered within bounds, and none of it is forgotten to a start's favour."""
+"""The memory of Stops and closed queues is bounded, and no start leaves because an entry was dropped."""
 
 from hypothesis import given
 from hypothesis import strategies as st

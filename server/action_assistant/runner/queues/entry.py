@@ -20,7 +20,7 @@ from action_assistant.runner.runs.doubts import ClosedWhy
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.start.admission import StartRequest, Watching
 from action_assistant.runner.start.kept_starts import ordered_in, require_form, start_of
-from action_assistant.runner.start.orders import engines_of
+from action_assistant.runner.start.orders import engines_of, graphs_inside
 from action_assistant.runner.start.preflight import Item, Preflight
 from action_assistant.umrf.start_values import StartValues
 
@@ -320,8 +320,7 @@ def entered_of(
         engines=request.each_whole,
         values=start.values,
         by_itself=request.by_itself,
-        inside=tuple(each.graph for each in start.subgraphs if each.graph)
-        + (start.sight.graphs if start.sight is not None else ()),
+        inside=graphs_inside(start),
         unsighted=unsighted,
     )
 

@@ -47,7 +47,12 @@ from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest, Watching
 from action_assistant.runner.start.kept_starts import group_of, require_form, text_of
-from action_assistant.runner.start.orders import InRepeat, engines_of, watched_in
+from action_assistant.runner.start.orders import (
+    InRepeat,
+    engines_of,
+    graphs_inside,
+    watched_in,
+)
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
@@ -229,8 +234,7 @@ class Repeats:
             grid=request.grid,
             seed=request.seed,
             by_itself=request.by_itself,
-            inside=tuple(each.graph for each in start.subgraphs if each.graph)
-            + (start.sight.graphs if start.sight is not None else ()),
+            inside=graphs_inside(start),
             unsighted=start.sight is None and self._control.sight.has_rules,
         )
         async with self._opening:

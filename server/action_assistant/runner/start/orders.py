@@ -311,6 +311,12 @@ def engines_of(request: StartRequest) -> tuple[str, ...]:
     return tuple(sorted({*named} - {SIMULATOR}))
 
 
+def graphs_inside(request: StartRequest) -> tuple[str, ...]:
+    """Return the ids of the graphs inside of what a start takes, as far as it names them."""
+    named = tuple(each.graph for each in request.subgraphs if each.graph)
+    return named + (request.sight.graphs if request.sight is not None else ())
+
+
 def kept_for(request: StartRequest) -> tuple[str, ...]:
     """Return what one start at a time may have: its robots, by name, and the run that it continues, if
     any. No robot's name has a slash."""
