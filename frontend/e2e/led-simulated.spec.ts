@@ -58,7 +58,7 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   await expect(waits(page)).toContainText("Breakpoint before Grip", { timeout: 15_000 });
   const step = (name: string) =>
     waits(page).getByRole("button", { name: `Let only ${name} on the simulator begin` });
-  await expect(step("Grip 0")).toBeVisible();
+  await expect(step("Grip")).toBeVisible();
   await expect(card(page, "Grip")).not.toContainText("running");
   const desktop = page.viewportSize() ?? { width: 1440, height: 900 };
   await page.setViewportSize({ width: 390, height: 844 });
@@ -68,12 +68,9 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   const far = waits(page).getByRole("combobox", { name: "How far it goes on" });
   await expect(far.getByRole("option")).toContainText(["to its end", "until Drive", "until Lift"]);
   await far.selectOption("Lift_0");
-  await holdEnter(
-    page,
-    waits(page).getByRole("button", { name: /until Lift 0 is about to begin$/ }),
-  );
-  await expect(waits(page)).toContainText("It went on until Lift_0", { timeout: 15_000 });
-  await expect(step("Lift 0")).toBeVisible();
+  await holdEnter(page, waits(page).getByRole("button", { name: /until Lift is about to begin$/ }));
+  await expect(waits(page)).toContainText("It went on until Lift,", { timeout: 15_000 });
+  await expect(step("Lift")).toBeVisible();
   await page.getByRole("button", { name: /^Stop/ }).first().click();
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
   await expect(waits(page)).toBeHidden();
@@ -159,8 +156,8 @@ test("a run asks people, on every page, and their first answer is its outcome", 
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("finished");
   await page.setViewportSize({ width: 1440, height: 900 });
   const answers = page.getByRole("list", { name: "Answered" });
-  await expect(answers).toContainText(/Confirm 0: yes, by .?Ada/);
-  await expect(answers).toContainText(/Choose 0: right, by .?Ada/);
+  await expect(answers).toContainText(/Confirm: yes, by .?Ada/);
+  await expect(answers).toContainText(/Choose: right, by .?Ada/);
 });
 
 /** Leads a graph in the simulator until it waits at a breakpoint before its action *Grip*. */
@@ -185,10 +182,10 @@ test("on the canvas of a run people let it wait at an action and an arrow, and g
 
   // In the editor the run has breakpoints of its own beside those of the graph.
   await choose(page, "Look");
-  await at("Look 0")
-    .getByRole("button", { name: /^Let run \d+ wait at Look 0$/ })
+  await at("Look")
+    .getByRole("button", { name: /^Let run \d+ wait at Look$/ })
     .click();
-  await expect(at("Look 0")).toContainText("This run waits before this.");
+  await expect(at("Look")).toContainText("This run waits before this.");
   await expect(card(page, "Look").locator("[data-breakpoint]")).toBeVisible();
 
   const [run] = await runs();
@@ -196,27 +193,27 @@ test("on the canvas of a run people let it wait at an action and an arrow, and g
   await expect(card(page, "Look").locator("[data-breakpoint]")).toBeVisible();
   await card(page, "Lift").focus();
   await page.keyboard.press("Enter");
-  const far = at("Lift 0").getByRole("button", { name: /go on until Lift 0 is about to begin$/ });
+  const far = at("Lift").getByRole("button", { name: /go on until Lift is about to begin$/ });
   await expect(far).toBeEnabled();
   await page.locator('[aria-label^="Arrow from Lift 0, when true"]').focus();
   await page.keyboard.press("Enter");
-  await at("Lift 0 → Look 0")
+  await at("Lift → Look")
     .getByRole("button", { name: /^Let run/ })
     .click();
   await expect(page.locator(".react-flow__edgelabel-renderer [data-breakpoint]")).toBeVisible();
 
   await card(page, "Look").click({ position: { x: 40, y: 24 } });
-  const removed = at("Look 0").getByRole("button", { name: /no longer wait at Look 0$/ });
+  const removed = at("Look").getByRole("button", { name: /no longer wait at Look$/ });
   await holdEnter(page, removed);
   await expect(removed).toBeHidden();
   await card(page, "Lift").click({ position: { x: 40, y: 24 } });
   await holdEnter(page, far);
-  await expect(waits(page)).toContainText("It went on until Lift_0", { timeout: 15_000 });
+  await expect(waits(page)).toContainText("It went on until Lift,", { timeout: 15_000 });
   await holdEnter(page, waits(page).getByRole("button", { name: /^Let run \d+ go on$/ }));
-  await expect(waits(page)).toContainText("towards Look_0", { timeout: 15_000 });
+  await expect(waits(page)).toContainText("towards Look", { timeout: 15_000 });
   await page.getByRole("button", { name: /^Stop/ }).first().click();
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
-  await expect(at("Lift 0")).toBeHidden();
+  await expect(at("Lift")).toBeHidden();
 });
 
 test("a step goes into a sub-graph that is opened, and over it", async () => {
@@ -266,14 +263,14 @@ test("a step goes into a sub-graph that is opened, and over it", async () => {
 
   const step = (name: string) =>
     waits(page).getByRole("button", { name: `Let only ${name} on the simulator begin` });
-  await expect(waits(page)).toContainText("Breakpoint before Reach", { timeout: 15_000 });
+  await expect(waits(page)).toContainText("Breakpoint before Grip › Reach", { timeout: 15_000 });
   await holdEnter(page, waits(page).getByRole("button", { name: /^Let run \d+ go on$/ }));
-  await expect(waits(page)).toContainText("Breakpoint before Close", { timeout: 15_000 });
-  await expect(step("Grip 0 › Close 0")).toBeVisible();
+  await expect(waits(page)).toContainText("Breakpoint before Grip › Close", { timeout: 15_000 });
+  await expect(step("Grip › Close")).toBeVisible();
   await expect(card(page, "Grip")).toContainText("1 of 2 inside ended");
   await page.screenshot({ path: "test-results/over-1440.png" });
-  await holdEnter(page, waits(page).getByRole("button", { name: /^Let all inside of .?Grip 0/ }));
-  await expect(waits(page)).toContainText("It went over Grip_0: Lift_0 waits to begin", {
+  await holdEnter(page, waits(page).getByRole("button", { name: /^Let all inside of .?Grip/ }));
+  await expect(waits(page)).toContainText("It went over Grip: Lift waits to begin", {
     timeout: 15_000,
   });
   await expect(card(page, "Grip")).toContainText("2 of 2 inside ended");
@@ -340,13 +337,13 @@ test("the canvas of a run has a menu by keys, mouse and finger: wait, go on unti
 
   await card(page, "Look").focus();
   await page.keyboard.press("Shift+F10");
-  await menu.getByRole("button", { name: /^Let run \d+ wait at Look 0$/ }).click();
+  await menu.getByRole("button", { name: /^Let run \d+ wait at Look$/ }).click();
   await expect(card(page, "Look").locator("[data-breakpoint]")).toBeVisible();
   await page.screenshot({ path: "test-results/run-menu-1440.png" });
   await page.keyboard.press("Escape");
   await expect(menu).toBeHidden();
   await card(page, "Lift").click({ button: "right", position: { x: 40, y: 24 } });
-  await expect(menu.getByRole("button", { name: /go on until Lift 0/ })).toBeEnabled();
+  await expect(menu.getByRole("button", { name: /go on until Lift/ })).toBeEnabled();
   await page.keyboard.press("Escape");
 
   await page.setViewportSize({ width: 360, height: 740 });
@@ -359,8 +356,8 @@ test("the canvas of a run has a menu by keys, mouse and finger: wait, go on unti
   await expect(menu).toBeVisible();
   await card(page, "Lift").dispatchEvent("pointerup", finger);
   await page.screenshot({ path: "test-results/run-menu-360.png" });
-  await holdEnter(page, menu.getByRole("button", { name: /go on until Lift 0/ }));
-  await expect(waits(page)).toContainText("It went on until Lift_0", { timeout: 15_000 });
+  await holdEnter(page, menu.getByRole("button", { name: /go on until Lift/ }));
+  await expect(waits(page)).toContainText("It went on until Lift,", { timeout: 15_000 });
   await page.keyboard.press("Escape");
   await page.setViewportSize({ width: 1440, height: 900 });
 
@@ -368,6 +365,6 @@ test("the canvas of a run has a menu by keys, mouse and finger: wait, go on unti
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 15_000 }).toBe("stopped");
   await card(page, "Look").focus();
   await page.keyboard.press("Shift+F10");
-  await menu.getByRole("button", { name: /^Run from .?Look 0.? …$/ }).click();
+  await menu.getByRole("button", { name: /^Run from .?Look.? …$/ }).click();
   await expect(dialog(page)).toContainText(/Run from .?Look/);
 });

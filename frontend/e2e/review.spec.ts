@@ -253,7 +253,7 @@ test("values as an action ran with them stand beside those that were sent", asyn
   const run = await ran({ "*": [QUICK] }, await handingOver());
   await page.goto(`${product.url}/runs/${run.id}`);
   await page.getByRole("tab", { name: "Parameters" }).click();
-  const move = page.getByRole("region", { name: "Parameters of Move 0" });
+  const move = page.getByRole("region", { name: "Parameters of Move" });
   await expect(move.getByRole("row", { name: /value/ })).toContainText("5≠ 7");
   // A dry-run that begins at its end has them, too.
   await page.getByRole("slider", { name: "Moment of the run" }).press("End");

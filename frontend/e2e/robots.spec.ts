@@ -263,7 +263,7 @@ test.describe("what the page shows of an engine that", () => {
     await expect(word("David", run)).toContainText("running");
     await page.goto(`${product.url}/graphs/${graph}`);
     await page.getByRole("button", { name: /^Stop run/ }).click();
-    await expect(alarm(page)).toContainText("Wait_0 did not obey", { timeout: 20_000 });
+    await expect(alarm(page)).toContainText("Wait did not obey", { timeout: 20_000 });
     expect((await runs())[0]?.state).toBe("stopping");
     await expect(page.getByRole("button", { name: /^Stop run/ })).toBeEnabled();
     await choose(page, await product.chain(1), ["David"]);

@@ -2,10 +2,11 @@
 import type { Problem } from "../api/graphs";
 import type { PartOnCard } from "../canvas/editor-store";
 import { relationId } from "../graph/document-keys";
-import { endLabel, pathWords, valueText } from "../graph/field-words";
+import { pathWords, valueText } from "../graph/field-words";
 import { ENTRY, type Graph, type Key, PRECONDITIONS } from "../graph/model";
 import { placeOf } from "../graph/problems/problem-groups";
 import { shownName } from "../graph/questions";
+import { endLabel } from "../graph/spoken-name";
 import { isolated } from "../words/isolated";
 
 export interface Hit {

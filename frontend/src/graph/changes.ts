@@ -6,8 +6,9 @@
 
 import { isolated } from "../words/isolated";
 import { bundleOfKey, endsOf, type Maps, ROOTS, type Root, splitKey } from "./document-keys";
-import { endLabel, fieldWords, SILENT_FIELDS, shortText } from "./field-words";
+import { fieldWords, SILENT_FIELDS, shortText } from "./field-words";
 import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
+import { endLabel } from "./spoken-name";
 import { isEqual } from "./values";
 import { readWaypoints } from "./waypoints";
 

@@ -4,8 +4,7 @@
  */
 
 import { memberText } from "./json-members";
-import type { Key, Parameter } from "./model";
-import { shownName } from "./questions";
+import type { Parameter } from "./model";
 
 /** Words by the key of a field in the document; a key that stands for itself is not listed. */
 const WORDS: Readonly<Record<string, string>> = {
@@ -38,20 +37,6 @@ export function fieldWords(field: string): string {
 
 /** Return a field without the word "input", where it is plain: values that people set are those of inputs. */
 export const plainFieldWords = (field: string): string => fieldWords(field).replace(/^input /, "");
-
-/** Return the full name of an action, such as `Drive_0`, as people say it: with its number if that is not 0. */
-export function spokenName(fullName: string): string {
-  const end = endLabel(fullName);
-  if (end !== null) return end;
-  const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
-  if (own === undefined) return fullName || "an action";
-  return number === "0" ? shownName(own) || "an action" : `${shownName(own)} ${number}`;
-}
-
-/** Return the name of the entry or the exit; null for an action. */
-export function endLabel(key: Key): "Entry" | "Exit" | null {
-  return key === "entry" ? "Entry" : key === "exit" ? "Exit" : null;
-}
 
 /** Return a value as text of at most `longest` characters, with a sign if it was longer. */
 export function shortText(text: string, longest: number): string {

@@ -6,7 +6,6 @@
  */
 
 import { isolated } from "../words/isolated";
-import { endLabel } from "./field-words";
 import {
   ENTRY,
   EXIT,
@@ -19,6 +18,7 @@ import {
 } from "./model";
 import { shownName } from "./questions";
 import { handOverOf, robotOf, robotWord } from "./robots";
+import { endLabel } from "./spoken-name";
 
 /** Words for how an action ended, after its name: "Scan ends true". */
 const ENDINGS: Readonly<Record<Precondition, string>> = {

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { spokenName } from "../graph/field-words";
+import { spokenName } from "../graph/spoken-name";
 import { entryLines, lineText, shortened, whenWords } from "./entry-words";
 
 type SittingChanges = Parameters<typeof entryLines>[0];

@@ -3,8 +3,9 @@
  */
 import type { HistoryEntry } from "../api/history";
 import { type FieldChange, linesOf } from "../differences/difference-words";
-import { fieldWords, shortText, spokenName } from "../graph/field-words";
+import { fieldWords, shortText } from "../graph/field-words";
 import { PRECONDITIONS } from "../graph/model";
+import { spokenName } from "../graph/spoken-name";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 

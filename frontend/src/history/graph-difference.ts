@@ -5,7 +5,7 @@ import type { ChangeMark, ChangeMarks } from "../canvas/marks/change-marks";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { relationId } from "../graph/document-keys";
 import { notesOf, readNote } from "../graph/edit/notes";
-import { endLabel, fieldWords, spokenName } from "../graph/field-words";
+import { fieldWords } from "../graph/field-words";
 import {
   type Action,
   fullName,
@@ -15,6 +15,7 @@ import {
   type Relation,
 } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
+import { endLabel, spokenName } from "../graph/spoken-name";
 import { isEqual } from "../graph/values";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";

@@ -21,7 +21,8 @@ import type { Graph } from "../graph/model";
 import { dataFlowOf } from "../graph/parameters/data-flow";
 import type { CheckedPlaceInside, ProblemKind } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
-import { INTO, spaced } from "../status/level-places";
+import { spokenName } from "../graph/spoken-name";
+import { INTO } from "../status/level-places";
 import { focusField } from "../ui/focus-field";
 import { keyOf } from "../ui/keys";
 import { Tooltip } from "../ui/tooltip";
@@ -149,7 +150,7 @@ function WayInside({ inside }: { inside: CheckedPlaceInside | undefined }) {
     key: aids[i] ?? "",
     name: level.slice(0, level.lastIndexOf("_")),
   }));
-  const words = levels.map(spaced).join(INTO);
+  const words = levels.map(spokenName).join(INTO);
   return (
     <button
       type="button"

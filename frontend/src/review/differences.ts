@@ -7,9 +7,10 @@ import { engineWords } from "../api/led-runs";
 import type { ComparedField, ComparedStep, Comparison } from "../api/review";
 import type { Visit } from "../api/runs";
 import { plainValue } from "../differences/difference-words";
+import { spokenName } from "../graph/spoken-name";
 import { spokenText } from "../graph/spoken-text";
 import { boundsText } from "../status/durations";
-import { INTO, spaced, wayWords } from "../status/level-places";
+import { INTO, wayWords } from "../status/level-places";
 import { visitDuration } from "../status/progress";
 import { valueLines } from "../status/value-words";
 import { isolated } from "../words/isolated";
@@ -218,7 +219,7 @@ export function likelyCause(found: Comparison): string | null {
   const { step } = parting;
   const level = step.levels.at(-1)?.replace(/_\d+$/, "");
   if (level !== undefined && found.subgraphs.includes(level))
-    return `the graph inside ${step.levels.map(spaced).join(INTO)} was another one`;
+    return `the graph inside ${step.levels.map(spokenName).join(INTO)} was another one`;
   const own = found.graph.actions.find(({ aid }) => step.aid !== null && aid === step.aid);
   // Values of an action explain how it ended, not that it did not run.
   const both = step.a !== null && step.b !== null;
@@ -243,7 +244,7 @@ export function likelyCause(found: Comparison): string | null {
 /** Return a sentence about two runs with the names of actions as people say them. */
 export function spokenOf(found: Pick<Comparison, "steps">, text: string): string {
   const known = new Set(found.steps.flatMap(({ name, levels }) => [name, ...levels]));
-  return spokenText(text, known, spaced);
+  return spokenText(text, known);
 }
 
 /** The likely cause as a sentence, or that there is none. */

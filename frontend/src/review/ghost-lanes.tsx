@@ -2,10 +2,11 @@
 import { useMemo, useState } from "react";
 import type { ComparedStep, Comparison } from "../api/review";
 import type { Run, Visit } from "../api/runs";
+import { spokenName } from "../graph/spoken-name";
 import { barOf, shareOf, type TimeAxis, ticksOf, wholeSpan } from "../status/lanes/axis";
 import { AllLevels, LaneToggle, type OpenLanes, useOpenLanes } from "../status/lanes/lane-row";
 import { openLanes } from "../status/lanes/lanes";
-import { spaced, wayWords } from "../status/level-places";
+import { wayWords } from "../status/level-places";
 import { visitBegin, visitEnd } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Segments } from "../ui/segments";
@@ -98,7 +99,7 @@ function GhostName({ action, parts, onPick, inside }: Omit<LaneProps, "steps" | 
         onClick={() => onPick(aid)}
       >
         {parts && <b className={style.mark}>1</b>}
-        <bdi>{spaced(label)}</bdi>
+        <bdi>{spokenName(label)}</bdi>
       </button>
     </span>
   );

@@ -6,7 +6,8 @@ import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { addressInside, type Level, levelsOf } from "../canvas/level-path";
 import { fullName, type Graph, type Key } from "../graph/model";
-import { factOf, placesOf, spaced } from "../status/level-places";
+import { spokenName } from "../graph/spoken-name";
+import { factOf, placesOf } from "../status/level-places";
 import type { GraphInRun } from "../status/progress-inside";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks";
@@ -22,7 +23,7 @@ function editorAddress({ way, graphs }: LevelCursor): string | null {
 
 function Crumbs({ level, name }: { level: LevelCursor; name: string }) {
   const { levels, graphs, enter } = level;
-  const words = [name, ...levels.map(spaced)];
+  const words = [name, ...levels.map(spokenName)];
   return (
     <nav aria-label="Levels">
       <ol className={style.way}>
@@ -65,7 +66,7 @@ export function LevelBar({ level, name }: { level: LevelCursor; name: string }) 
           className={style.enter}
           onClick={() => enter([...levels, fullName(chosen)], null)}
         >
-          <IconStairsDown size={14} aria-hidden /> Inside <bdi>{spaced(fullName(chosen))}</bdi>
+          <IconStairsDown size={14} aria-hidden /> Inside <bdi>{spokenName(fullName(chosen))}</bdi>
         </button>
       )}
       {editor !== null && (

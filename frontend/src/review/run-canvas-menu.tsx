@@ -5,8 +5,8 @@ import { IconPlayerSkipForward } from "@tabler/icons-react";
 import { useVersions } from "../api/graphs";
 import type { Run } from "../api/runs";
 import { fullName, type Graph, type Position } from "../graph/model";
+import { spokenName } from "../graph/spoken-name";
 import { isOpened } from "../status/earlier-list";
-import { spaced } from "../status/level-places";
 import { RunPoint } from "../status/run-point";
 import { keyOf } from "../ui/keys";
 import { isolated } from "../words/isolated";
@@ -107,7 +107,7 @@ function RunFromHere({ run, engines, action, onStart }: RunFromHereProps) {
         })
       }
     >
-      Run from {isolated(spaced(action))} …
+      Run from {isolated(spokenName(action))} …
     </Button>
   );
 }

@@ -61,8 +61,8 @@ test("nothing comes before the start, although the engine's clock stands behind"
   const told = eventLines(ran("2026-11-20T09:00:00.990Z", "2026-11-20T09:00:02.000Z"), "v1");
   expect(told.map(({ name, text }) => [name, text])).toEqual([
     [null, "Ada started v1 in the simulator"],
-    ["Look 0", "runs"],
-    ["Look 0", "true"],
+    ["Look", "runs"],
+    ["Look", "true"],
     [null, "Run finished"],
   ]);
 });

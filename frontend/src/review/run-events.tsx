@@ -8,7 +8,7 @@ import { useCurrentName } from "../api/people";
 import { exportUrl, type ReplayMark, useRawEvents } from "../api/review";
 import type { RunNote } from "../api/run-notes";
 import { type Run, runPlace } from "../api/runs";
-import { placesOf, wayWords } from "../status/level-places";
+import { placesOf, spokenIn, wayWords } from "../status/level-places";
 import {
   howWords,
   runEndText,
@@ -137,7 +137,8 @@ export function eventLines(
   }
   for (const alarm of run.alarms) {
     const at = instant(alarm.at);
-    if (at !== null) all.push({ at, tone: "error", name: null, fact: null, text: alarm.text });
+    if (at !== null)
+      all.push({ at, tone: "error", name: null, fact: null, text: spokenIn(run, alarm.text) });
   }
   const end = instant(run.ended_at);
   if (end !== null)
@@ -146,7 +147,7 @@ export function eventLines(
       tone: "idle",
       name: null,
       fact: null,
-      text: `Run ${runEndText(run)}${run.detail ? `: ${run.detail}` : ""}`,
+      text: `Run ${runEndText(run)}${run.detail ? `: ${spokenIn(run, run.detail)}` : ""}`,
       order: Number.MAX_VALUE,
     });
   all.sort((a, b) => a.at - b.at || (a.order ?? 0) - (b.order ?? 0));

@@ -13,6 +13,7 @@ import { limitWords, pageWords } from "../api/rights";
 import { type Run, requesterPlace, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { fromWords } from "../status/earlier-list";
+import { spokenIn } from "../status/level-places";
 import { runEndText } from "../status/progress";
 import { valuesWords } from "../status/value-words";
 import { useDraft } from "../ui/drafts";
@@ -122,7 +123,7 @@ export function RunFacts({ runner, run, version, by, at }: Props) {
     ["Took", (end !== null && boundsText(run.took)) || "—"],
     ["End", end === null ? "goes on" : runEndText(run)],
     ["Result", run.result?.replace(/^on_/, "") ?? "—"],
-    ["Why", run.detail || "—"],
+    ["Why", spokenIn(run, run.detail) || "—"],
     ["Recorded", run.recorded ? "all of it" : "NOT all of it: the journal could not be written"],
     ...(run.archived
       ? [

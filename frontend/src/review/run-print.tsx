@@ -6,7 +6,7 @@ import { type Run, requesterPlace, runPlace, type Visit } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
 import { fromWords } from "../status/earlier-list";
-import { actionWords } from "../status/level-places";
+import { actionWords, spokenIn } from "../status/level-places";
 import { howWords, progressOf, runEndText, visitDuration } from "../status/progress";
 import { useUnsure } from "../status/silence";
 import { valuesWords } from "../status/value-words";
@@ -138,7 +138,7 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
         ["End known", end === null ? "goes on" : moment(end)],
         ["Took", (end !== null && boundsText(run.took)) || "not known"],
         ["Outcome", end === null ? "goes on" : runEndText(run)],
-        ...(run.detail ? [["Why", run.detail] as const] : []),
+        ...(run.detail ? [["Why", spokenIn(run, run.detail)] as const] : []),
         ["Recorded", run.recorded ? "all of it" : "NOT all of it"],
         ["Printed", `${dateText(now)} ${clock(now)}`],
       ]}

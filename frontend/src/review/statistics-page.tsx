@@ -6,8 +6,9 @@ import { Link, useSearch } from "wouter";
 import { errorText } from "../api/http";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";
+import { spokenName } from "../graph/spoken-name";
 import { boundsText } from "../status/durations";
-import { INTO, spaced } from "../status/level-places";
+import { INTO } from "../status/level-places";
 import { runLabel } from "../status/progress";
 import { useSiteChoice } from "../status/site-choice";
 import { toneColor } from "../status/state-label";
@@ -121,9 +122,9 @@ function ActionWay({ action: { levels, name } }: { action: ActionStatistics }) {
   return (
     <bdi>
       {levels.length > 0 && (
-        <span className="ink3 weight-400">{[...levels.map(spaced), ""].join(INTO)}</span>
+        <span className="ink3 weight-400">{[...levels.map(spokenName), ""].join(INTO)}</span>
       )}
-      {spaced(name)}
+      {spokenName(name)}
     </bdi>
   );
 }

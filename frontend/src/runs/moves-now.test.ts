@@ -47,7 +47,7 @@ test("what runs is named by robot, and what was only concluded is marked", () =>
     actions: actions({ Drive_0: action("RUNNING"), Open_0: action("FINISHED") }),
   });
   expect(movesNow(live([birch, atlas])).map(({ robot, words }) => `${robot}: ${words}`)).toEqual([
-    "atlas: Drive 0",
+    "atlas: Drive",
     "birch: Hold 2 (inferred)",
   ]);
 });
@@ -63,7 +63,7 @@ test("what runs inside of an action is named by the way to it, as people call it
       "Round__Fetch__0/Lift_0": { ...inner, state: "FINISHED" },
     }),
   });
-  expect(movesNow(live([round]))[0]?.words).toBe("Wait 0, Fetch 0 › Grip 0 › Close 1");
+  expect(movesNow(live([round]))[0]?.words).toBe("Wait, Fetch › Grip › Close 1");
 });
 
 test("of a robot that is not heard nothing is said to move, and nothing to rest", () => {
@@ -96,9 +96,9 @@ test("a led run is told robot by robot; a robot that nothing was begun on waits"
     }),
   });
   expect(movesNow(live([led])).map(({ robot, kind, words }) => [robot, kind, words])).toEqual([
-    ["Carol", "moves", "Drive 0"],
+    ["Carol", "moves", "Drive"],
     ["David", "still", "waits"],
-    ["simulator", "moves", "Ring 0"],
+    ["simulator", "moves", "Ring"],
   ]);
 });
 

@@ -2,7 +2,7 @@
 import type { ReactNode } from "react";
 import type { Run } from "../api/runs";
 import type { Earlier, StartFrom } from "../api/starts";
-import { spokenName } from "../graph/field-words";
+import { spokenName } from "../graph/spoken-name";
 import { ago, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import style from "./earlier-list.module.css";

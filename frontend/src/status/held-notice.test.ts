@@ -19,7 +19,7 @@ test("a held run says what goes on all the same, and on which robot", () => {
     Beep_0: action("STOPPING", ""),
   };
   const words = heldWords(run({ actions }), NONE);
-  expect(words?.why).toBe("Waiting: Look_0 on David: the robot does not answer.");
+  expect(words?.why).toBe("Waiting: Look on David: the robot does not answer.");
   expect(words?.moving).toMatch(
     /^STILL MOVING: Drive.* on .?Carol.?\. Not over, and moves nothing: Beep.* on the simulator\.$/,
   );

@@ -18,11 +18,12 @@ import { letGoOn, letStep, type StepGoal } from "../api/presses";
 import { SIMULATOR } from "../api/robots";
 import { MOVES } from "../api/run-stop";
 import type { Run } from "../api/runs";
+import { spokenName } from "../graph/spoken-name";
 import { HoldButton } from "../ui/hold-button";
 import { boundedPart } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
 import style from "./held-notice.module.css";
-import { actionWords, INTO, spaced } from "./level-places";
+import { actionWords, INTO, spokenIn } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
 import { movingRests } from "./rests";
 import { ServiceNotices } from "./robot-rights";
@@ -85,7 +86,7 @@ export function heldWords(
 ): { why: string; moving: string } | null {
   if (!run.held || run.ended_at !== null || run.desired === "stopped") return null;
   return {
-    why: `Waiting: ${run.held.why.replace(/\.$/, "")}.`,
+    why: `Waiting: ${spokenIn(run, run.held.why).replace(/\.$/, "")}.`,
     moving: movingWords(run, silent),
   };
 }
@@ -157,7 +158,7 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
         );
       })}
       {levelsAround(run).map((over) => {
-        const level = isolated(over.map(spaced).join(INTO));
+        const level = isolated(over.map(spokenName).join(INTO));
         return (
           <HoldButton
             key={level}

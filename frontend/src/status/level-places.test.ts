@@ -3,7 +3,8 @@ import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { factOf, placesIn } from "./level-places";
+import type { Run } from "../api/runs";
+import { factOf, placesIn, spokenIn } from "./level-places";
 
 interface Vector {
   why: string;
@@ -62,4 +63,23 @@ test("whatever runs inside is placed where it runs, and nothing is lost", () => 
       }
     }),
   );
+});
+
+test("texts of the runner call the actions of their run as cards do, and leave all else", () => {
+  const actions = {
+    Fetch_0: { aid: "f" },
+    Lift_1: { aid: "l" },
+    "round__Fetch__0/Lift_1": { aid: null },
+  };
+  const run = { graph_name: "round", actions } as unknown as Run;
+  const said = (text: string) => spokenIn(run, text);
+  expect(said("Breakpoint after Fetch_0.")).toBe("Breakpoint after Fetch.");
+  expect(said("It went over round__Fetch__0/Lift_1: Lift_1 waits (Fetch_0)")).toBe(
+    "It went over Fetch › Lift 1: Lift 1 waits (Fetch)",
+  );
+  const opened = { ...run, actions: { Close_0: { aid: null, levels: ["Grip_0"] } } };
+  expect(spokenIn(opened, "It went over Grip_0: Close_0 waits.")).toBe(
+    "It went over Grip: Grip › Close waits.",
+  );
+  expect(said("Grip_0 of task_1 on robot_2")).toBe("Grip_0 of task_1 on robot_2");
 });

@@ -1,7 +1,7 @@
 /** Assigns the facts of a run to its levels: an engine names actions of sub-graphs `OUTER__NAME__ID/ACTION`. Pure.
  * The runner places by the same rule (docs/decisions/073-a-run-by-its-levels.md). */
 import type { Run } from "../api/runs";
-import { shownName } from "../graph/questions";
+import { spokenName } from "../graph/spoken-name";
 
 /** Position of an action in the hierarchy of a run. */
 export interface LevelPlace {
@@ -96,20 +96,22 @@ export function factOf(graph: string, way: readonly string[]): string {
   return `${above.reverse().reduce(partOf, graph)}/${last}`;
 }
 
-/** An action as people call it: `Grip_0` is Grip 0. */
-export function spaced(fullName: string): string {
-  const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
-  return own === undefined ? fullName : `${shownName(own)} ${number}`;
-}
-
 /** The way to an action, in words. */
 export function wayWords({ levels, name }: Pick<LevelPlace, "levels" | "name">): string {
-  return [...levels, name].map(spaced).join(INTO);
+  return [...levels, name].map(spokenName).join(INTO);
 }
 
-/** An action of a run in words, with the actions that it is inside of: `Round__Fetch__0/Lift_0` is Fetch 0 › Lift 0. */
+/** An action of a run in words, with the actions that it is inside of: `Round__Fetch__0/Lift_1` is Fetch › Lift 1. */
 export function actionWords(run: Run, name: string): string {
   const opened = run.actions?.[name]?.levels;
   if (opened) return wayWords({ levels: opened, name });
   return wayWords(placesOf(run).get(name) ?? { levels: [], name });
+}
+
+/** Return a text of the runner about a run with the actions of the run as people call them. */
+export function spokenIn(run: Run, text: string): string {
+  const opened = Object.values(run.actions ?? {}).flatMap(({ levels }) => levels ?? []);
+  return text.replace(/[\w/]+_\d+\b/g, (word) =>
+    run.actions?.[word] || opened.includes(word) ? actionWords(run, word) : word,
+  );
 }

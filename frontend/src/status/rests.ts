@@ -5,7 +5,7 @@ import { type Run, silentRests } from "../api/run-stop";
 import type { RunnerApi } from "../api/schema/runner";
 import { clock, instant } from "../ui/times";
 import { isolated } from "../words/isolated";
-import { actionWords } from "./level-places";
+import { actionWords, spokenIn } from "./level-places";
 import type { Tone } from "./progress";
 
 export type RobotRest = RunnerApi["RobotRestShown"];
@@ -43,7 +43,7 @@ export function restWords(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "w
   const time = at === null ? "" : ` at ${clock(at)}`;
   const since = at === null ? "" : ` since ${clock(at)}`;
   const step = rest.action ? isolated(actionWords(run, rest.action)) : "its action";
-  const why = rest.why ? `: ${isolated(sentence(rest.why))}` : "";
+  const why = rest.why ? `: ${isolated(spokenIn(run, sentence(rest.why)))}` : "";
   const stops = rest.stops ? "; the stop is repeated" : "";
   switch (rest.state) {
     case "unused":

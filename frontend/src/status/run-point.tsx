@@ -13,10 +13,10 @@ import type { Run } from "../api/runs";
 import { runMarks } from "../graph/breakpoints";
 import type { Graph } from "../graph/model";
 import { type Place, placeIn, toggledAt } from "../graph/run-breakpoints";
+import { spokenName } from "../graph/spoken-name";
 import { HoldButton } from "../ui/hold-button";
 import { isolated } from "../words/isolated";
 import { laterActions } from "./held-notice";
-import { spaced } from "./level-places";
 import style from "./run-point.module.css";
 import { useWatching, WatchTicks } from "./watching";
 
@@ -29,7 +29,7 @@ interface Props {
 }
 
 const placeWords = ({ action, to }: Place): string =>
-  to === "" ? spaced(action) : `${spaced(action)} → ${spaced(to)}`;
+  to === "" ? spokenName(action) : `${spokenName(action)} → ${spokenName(to)}`;
 
 /** True if people can set where a run waits: it is led, goes on, and is not being stopped. */
 const canSteer = (run: Run): boolean =>

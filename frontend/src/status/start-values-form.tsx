@@ -2,7 +2,8 @@
 import { Button, NativeSelect, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import type { AskedInput } from "../api/starts";
-import { shortText, spokenName } from "../graph/field-words";
+import { shortText } from "../graph/field-words";
+import { spokenName } from "../graph/spoken-name";
 import { isolated } from "../words/isolated";
 import { type Drafts, draftOf, type Proposal } from "./start-values";
 import style from "./start-values-form.module.css";

@@ -1,7 +1,7 @@
 /** Values of a start: what people type for the inputs that it asks for, and what is sent of that. Pure. */
 import type { AskedInput, EarlierValues, StartValue, StartValues } from "../api/starts";
-import { spokenName } from "../graph/field-words";
 import { parameterValueOf, shown, TYPES, typed } from "../graph/parameters/values";
+import { spokenName } from "../graph/spoken-name";
 import { isolated } from "../words/isolated";
 import { inputWords, placeOfInput } from "./value-words";
 

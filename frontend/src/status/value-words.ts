@@ -1,6 +1,6 @@
 /** Values of a start in words. Apart from the form, which few pages show. Pure. */
 import type { AskedInput, StartValues } from "../api/starts";
-import { spokenName } from "../graph/field-words";
+import { spokenName } from "../graph/spoken-name";
 import { isolated } from "../words/isolated";
 
 /** Return the key of an input of a graph, by full and flat name. */

@@ -289,9 +289,11 @@ def title_of(name: str) -> str:
 
 
 def spoken(full_name: str) -> str:
-    """Return an action as people call it: `AaConfirm_0` is Confirm 0; other names stay."""
+    """Return an action as people call it: `AaConfirm_0` is Confirm, `AaConfirm_1` is Confirm 1;
+    other names stay."""
     name, _, number = full_name.rpartition("_")
-    return f"{_TITLES[name]} {number}" if name in _TITLES else full_name
+    title = _TITLES.get(name, "")
+    return full_name if not title else title if number == "0" else f"{title} {number}"
 
 
 # --- what they ask, and how long they wait ----------------------------------------------------------

@@ -415,6 +415,19 @@ def test_a_run_that_ended_false_goes_back_to_the_last_that_ended_false_inside() 
     ]
 
 
+def test_the_first_of_two_actions_alike_is_called_as_on_its_card() -> None:
+    told = (
+        state(3, "A_0", "RUNNING"),
+        *inside(4, "task__A__0", "Look_1", "false"),
+        *inside(6, "task__A__0", "Look_0", "false"),
+        NodeResult(7, "task", "A_0", "on_false"),
+        state(7, "A_0", "FINISHED"),
+    )
+    assert found(LINE, Observed(7, told), Ended(8, "finished", "on_false")) == [
+        "A › Look ended false."
+    ]
+
+
 def test_an_error_that_was_recovered_inside_is_not_the_cause_of_a_later_failure() -> None:
     told = (
         state(3, "A_0", "RUNNING"),

@@ -304,7 +304,7 @@ async def test_the_look_before_a_start_says_who_is_asked() -> None:
         graph = line(CONFIRM, "Scout", asking("AaWait", 2, seconds=5.0))
         (look, _) = await control.look(asked(asked_of(graph)), "ann")
         texts = {each.code: each.text for each in look.items}
-        assert texts["asks"] == "People answer Confirm 0. The runner waits for Wait 2."
+        assert texts["asks"] == "People answer Confirm. The runner waits for Wait 2."
         assert "simulator" not in texts["moves"]
 
 

@@ -10,9 +10,9 @@ import {
   rootOf,
   splitKey,
 } from "../document-keys";
-import { endLabel } from "../field-words";
 import type { Graph, Key } from "../model";
 import { shownName } from "../questions";
+import { endLabel } from "../spoken-name";
 import { isEqual } from "../values";
 import { asOneEdit, graphNow } from "./document-writes";
 

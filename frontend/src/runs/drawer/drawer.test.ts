@@ -49,7 +49,7 @@ test("each run that goes on has a tab, with what moves on its robot; silence is 
   const birch = run({ id: "b", engine: "birch", state: "unknown", unknown_since: iso(1) });
   const tabs = robotTabs([atlas, birch], [lane("Drive_0", "")], false);
   expect(tabs.map(({ robot, words, tone }) => [robot, words, tone])).toEqual([
-    ["atlas", "Drive 0", "run"],
+    ["atlas", "Drive", "run"],
     ["birch", "not known", "unknown"],
   ]);
   expect(allWords(tabs)).toBe("Both robots");
@@ -64,7 +64,7 @@ test("several robots in one run have a tab each, with their own actions", () => 
   const lanes = [lane("Drive_0", "atlas"), lane("Hold_0", "birch")];
   const tabs = robotTabs([run({ actions })], lanes, false);
   expect(tabs.map(({ actor, words }) => [actor, words])).toEqual([
-    ["atlas", "Drive 0"],
+    ["atlas", "Drive"],
     ["birch", "waits"],
   ]);
 });

@@ -1,4 +1,5 @@
 /** A run in the drawer: its head, a tab for each robot, and what they show while it is open. */
+
 import { Tabs } from "@mantine/core";
 import { useCallback, useMemo, useState } from "react";
 import { enginesOf } from "../../api/led-runs";
@@ -12,6 +13,7 @@ import { Answers } from "../../status/answers";
 import { RunQuestions } from "../../status/held-notice";
 import { isRobot, type Lane, performerWords, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
+import { spokenIn } from "../../status/level-places";
 import { resultTone, runLabel, type Tone, visitEnd } from "../../status/progress";
 import { RestList } from "../../status/rest-list";
 import { knownRest, type RobotRest, restWords } from "../../status/rests";
@@ -93,7 +95,7 @@ export function ShownRun(props: ShownRunProps) {
   const lanes = useLanes(run, graph, runs.length > 1 ? run.engine : "", sent);
   const tabs = robotTabs(runs, lanes, now.link !== "live", silentRobots(now));
   const shown = tabs.find(({ id }) => id === tab);
-  const told = toldOf(run) === run.held?.why ? "" : toldOf(run);
+  const told = toldOf(run) === run.held?.why ? "" : spokenIn(run, toldOf(run));
   const goes = run.ended_at === null;
   const announces = goes && !SHOUTED.has(currentAlarm(run)?.code ?? "");
   const inLine = folded === true || told.length < SHORT;

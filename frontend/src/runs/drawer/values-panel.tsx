@@ -4,7 +4,7 @@ import { engineWords } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Run, useRun } from "../../api/runs";
 import { fullName, type Graph, type Key } from "../../graph/model";
-import { spaced } from "../../status/level-places";
+import { spokenName } from "../../graph/spoken-name";
 import { visitBegin, visitEnd } from "../../status/progress";
 import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { isolated } from "../../words/isolated";
@@ -42,9 +42,9 @@ export function ValuesPanel({ run, graph, aid }: Props) {
   const whose = own ? isolated(own) : engineWords(run);
   const onlySent = found.values.some(({ from }) => from === "sent");
   return (
-    <aside className={style.values} aria-label={`Values of ${spaced(found.name)}`}>
+    <aside className={style.values} aria-label={`Values of ${spokenName(found.name)}`}>
       <h2>
-        {spaced(found.name)}
+        {spokenName(found.name)}
         {!run.simulated && ` on ${whose}`}
         <Age run={run} />
       </h2>
@@ -78,7 +78,7 @@ export function ValuesPanel({ run, graph, aid }: Props) {
           {found.after.map(({ name, result, at }, i) => (
             <span key={name}>
               {i > 0 && ", "}
-              <b>{spaced(name)}</b> {result} {at !== null && stopwatch(at)}
+              <b>{spokenName(name)}</b> {result} {at !== null && stopwatch(at)}
             </span>
           ))}
         </p>

@@ -5,7 +5,7 @@ import { type ReactNode, useState } from "react";
 import { useLocation } from "wouter";
 import { type Axis, openRepeat, type RepeatOrder } from "../../api/repeats";
 import type { AskedInput, StartValues } from "../../api/starts";
-import { spokenName } from "../../graph/field-words";
+import { spokenName } from "../../graph/spoken-name";
 import { givenBy } from "../../status/start-values";
 import { inputWords, placeOfInput } from "../../status/value-words";
 import { useKeptText } from "../../ui/kept-texts";

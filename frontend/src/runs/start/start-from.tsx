@@ -4,7 +4,7 @@ import { useDebouncedValue } from "@mantine/hooks";
 import { type ReactNode, useState } from "react";
 import { SIMULATOR } from "../../api/robots";
 import type { Earlier, StartFrom } from "../../api/starts";
-import { spokenName } from "../../graph/field-words";
+import { spokenName } from "../../graph/spoken-name";
 import { type Beginning, CHOICES, type Choice, EarlierList } from "../../status/earlier-list";
 import { useKeptText } from "../../ui/kept-texts";
 import { isolated } from "../../words/isolated";

@@ -8,7 +8,7 @@ import { errorText } from "../../api/http";
 import { engineWords } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { confirmRest, type Run } from "../../api/runs";
-import { actionWords } from "../../status/level-places";
+import { actionWords, spokenIn } from "../../status/level-places";
 import { openRests } from "../../status/rests";
 import { usePendingText } from "../../ui/drafts";
 import { HoldButton } from "../../ui/hold-button";
@@ -56,7 +56,7 @@ export function ConfirmRestDialog({ run, robot, opened, onClose }: Props) {
       <Text size="sm">
         Nothing that the engine says can show whether run {run.number} of{" "}
         <bdi>{run.graph_name}</bdi> has come to rest:{" "}
-        {(piece?.why || run.unconfirmed || "it does not answer").replace(/\.$/, "")}.
+        {spokenIn(run, piece?.why || run.unconfirmed || "it does not answer").replace(/\.$/, "")}.
       </Text>
       <Text size="sm" mt="xs">
         Only somebody who has looked at the robot can end this. Until then nothing is started there.

@@ -16,6 +16,7 @@ import { needsRestConfirmation } from "../../api/run-stop";
 import type { Run } from "../../api/runs";
 import { serverTimeOf, tick } from "../../clock/server-clock";
 import { HelpLink } from "../../status/help-link";
+import { spokenIn } from "../../status/level-places";
 import { restLines } from "../../status/rests";
 import { clock, duration, instant, useTick } from "../../ui/times";
 import { useRootMark } from "../../ui/use-root-mark";
@@ -41,9 +42,11 @@ export type StopNoticeText = {
 
 /** Return the runner's reason why the Stop is not proven; "" before it has given one. */
 function reasonOf(run: Run): string {
-  if (run.unconfirmed) return `${run.unconfirmed.replace(/\.$/, "")}.`;
   const alarm = run.alarms.findLast((each) => each.code === "stop_unconfirmed");
-  return alarm ? alarm.text.replace(/^STOP UNCONFIRMED: /, "") : "";
+  const told = run.unconfirmed
+    ? `${run.unconfirmed.replace(/\.$/, "")}.`
+    : (alarm?.text ?? "").replace(/^STOP UNCONFIRMED: /, "");
+  return spokenIn(run, told);
 }
 
 function unconfirmed(runs: readonly Run[], since?: string): StopNoticeText {
@@ -170,7 +173,7 @@ export function movingAgain(now: LiveState): StopNoticeText {
   if (runs.length === 0) return null;
   const each = runs.map((run) => {
     const told = run.alarms.findLast((alarm) => alarm.code === "moves_again");
-    const text = (told?.text ?? "").replace(/^MOVES AGAIN: /, "");
+    const text = spokenIn(run, told?.text ?? "").replace(/^MOVES AGAIN: /, "");
     const then =
       run.desired === "stopped" ? "It is being stopped again." : "Nobody has asked to stop it.";
     return `run ${run.number}: ${text} ${then}`;

@@ -3,10 +3,11 @@
 import { IconChevronDown, IconChevronRight } from "@tabler/icons-react";
 import { type CSSProperties, Fragment, memo, useCallback, useMemo, useRef, useState } from "react";
 import type { Visit } from "../../api/runs";
+import { spokenName } from "../../graph/spoken-name";
 import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
-import { spaced, wayWords } from "../level-places";
+import { wayWords } from "../level-places";
 import { type Progress, type Tone, visitsText } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
 import { type Bar, barOf, growingWay, shareOf, type TimeAxis, useMoving } from "./axis";
@@ -52,7 +53,7 @@ function LaneName({ lane, onPick, opened, nested, onOpen }: Omit<Props, "visits"
       >
         <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
         <span className="truncate">
-          <bdi>{spaced(lane.label)}</bdi>
+          <bdi>{spokenName(lane.label)}</bdi>
         </span>
       </button>
     </span>

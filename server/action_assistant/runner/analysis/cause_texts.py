@@ -1,7 +1,7 @@
 """Words causes as sentences, for the page and for the list of runs. Pure."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final, assert_never
 
 from action_assistant.runner.analysis.causes import (
@@ -22,7 +22,7 @@ from action_assistant.runner.analysis.causes import (
     Warned,
     WrongParameter,
 )
-from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
+from action_assistant.runner.analysis.levels import INTO, places_of
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.safe_text import sentence
@@ -174,23 +174,13 @@ def _command_in_words(cause: ForeignCause) -> str:
 
 def short_name(run: Run, full_name: str) -> str:
     """Return the name of an action for people, such as "Search › Pick 1": first the sub-graphs that
-    contain the action, from the outermost, then the action. `full_name`: name, "_" and number. The
-    number is left out where only one action of its level has the name."""
-    found = places_of(run)
-    place = found.get(full_name)
-    if place is None:
-        return _alone(full_name, run.actions)
-    way = place.way
-    steps = range(len(way))
-    return INTO.join(_alone(way[depth], _beside(found, way[:depth])) for depth in steps)
+    contain the action, from the outermost, then the action. `full_name`: name, "_" and number. A
+    number 0 is left out, as on cards."""
+    place = places_of(run).get(full_name)
+    return INTO.join(_alone(each) for each in (place.way if place is not None else (full_name,)))
 
 
-def _beside(found: Mapping[str, LevelPlace], levels: tuple[str, ...]) -> list[str]:
-    return [place.name for place in found.values() if place.levels == levels]
-
-
-def _alone(full_name: str, beside: Iterable[str]) -> str:
+def _alone(full_name: str) -> str:
     name, _, number = full_name.rpartition("_")
-    alike = [each for each in beside if each.rpartition("_")[0] == name]
     title = title_of(name) if name in READY_SIGNATURES else name
-    return title if len(alike) < 2 else f"{title} {number}"
+    return title if number == "0" else f"{title} {number}"
