@@ -93,6 +93,8 @@ test("while it cannot be sent the page says so, and goes on trying until it is p
 }) => {
   const { page, context } = await product.person(browser, "Ada");
   await running(page);
+  const drawnAt = async () => (await boxOf(page.getByRole("region", { name: "Graph" }))).y;
+  const before = await drawnAt();
   const runner = product.pid("runner");
   process.kill(runner, "SIGSTOP");
   const isStop = (request: Request) =>
@@ -105,6 +107,7 @@ test("while it cannot be sent the page says so, and goes on trying until it is p
       .click();
     const alert = page.getByRole("alert").filter({ hasText: "NOT SENT: use the hardware stop" });
     await expect(alert).toBeVisible();
+    expect(await drawnAt()).toBe(before); // what is drawn stays under the hand
     // One try has got no answer in its time, and the next one is sent.
     await failed;
     await page.waitForRequest(isStop);

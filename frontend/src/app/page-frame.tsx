@@ -109,7 +109,7 @@ export function PageBar({ crumbs, status, actions, start, graph, run, at }: Prop
   const [sharing, setSharing] = useState<boolean | null>(null);
   const share = useStableCallback(() => setSharing(true));
   const closeSharing = useStableCallback(() => setSharing(false));
-  const ways = { tight: Boolean(start), beside: graph !== undefined };
+  const ways = { tight: Boolean(start) || run !== undefined, beside: graph !== undefined };
   const { tight } = ways;
   const isPhone = useIsPhone();
   return (

@@ -175,7 +175,7 @@ export function RoomNotices() {
   const choosing = useStrandedEditsDialog();
   return (
     <>
-      <div className={style.notices} role="status">
+      <div className={style.notices} role="status" data-room-notices>
         <ReadOnly />
         <NotStored />
         {said && (

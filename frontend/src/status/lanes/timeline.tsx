@@ -117,7 +117,12 @@ function Ticks({ axis }: { axis: TimeAxis }) {
   return (
     <div className={style.axis} aria-hidden>
       {ticksOf(axis).map((t) => (
-        <span className="absolute nowrap" key={t} style={{ left: tickAt(axis, t) }}>
+        <span
+          className="absolute nowrap"
+          key={t}
+          data-last={shareOf(axis, originOf(axis) + t) > 0.97 || undefined}
+          style={{ left: tickAt(axis, t) }}
+        >
           {tickText(t)}
         </span>
       ))}
