@@ -118,7 +118,7 @@ test("the cause leads into the level where it failed, as an address tells it; an
   await expect(card(page, "OpenFingers").getByText("true")).toBeVisible();
   await expect(page.getByText("as it was then")).toBeVisible();
   const way = page.getByRole("navigation", { name: "Levels" });
-  await expect(way).toHaveText("RoundFetch 0Grip 0");
+  await expect(way).toHaveText("RoundFetchGrip");
   await way.getByRole("button", { name: "Fetch" }).click();
   await expect(card(page, "Grip")).toHaveClass(/\bselected\b/);
   await expect(page.getByText("as it was then")).toBeVisible();
