@@ -137,7 +137,7 @@ test("a run in which nothing moves says what it waits for, and keeps it as its c
   await expect(alarm).toContainText("NOTHING MOVES: David calls patrol running", {
     timeout: 30_000,
   });
-  await expect(alarm).toContainText("Work_1 waits for its input “speed”");
+  await expect(alarm).toContainText("Work 1 waits for its input “speed”");
   await page.screenshot({ path: test.info().outputPath("stalled.png") });
   await stopAll(page);
   await page.goto(`${product.url}/runs/${(await runs())[0]?.id}`);

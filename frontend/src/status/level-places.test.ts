@@ -77,7 +77,8 @@ test("texts of the runner call the actions of their run as cards do, and leave a
   expect(said("It went over round__Fetch__0/Lift_1: Lift_1 waits (Fetch_0)")).toBe(
     "It went over Fetch › Lift 1: Lift 1 waits (Fetch)",
   );
-  const opened = { ...run, actions: { Close_0: { aid: null, levels: ["Grip_0"] } } };
+  const inside = { Close_0: { aid: null, levels: ["Grip_0"] } };
+  const opened = { ...run, actions: inside } as unknown as Run;
   expect(spokenIn(opened, "It went over Grip_0: Close_0 waits.")).toBe(
     "It went over Grip: Grip › Close waits.",
   );
