@@ -29,7 +29,7 @@ interface Props {
 }
 
 const placeWords = ({ action, to }: Place): string =>
-  to === "" ? spokenName(action) : `${spokenName(action)} → ${spokenName(to)}`;
+  to === "" ? spokenName(action) : `${isolated(spokenName(action))} → ${isolated(spokenName(to))}`;
 
 /** True if people can set where a run waits: it is led, goes on, and is not being stopped. */
 const canSteer = (run: Run): boolean =>

@@ -42,7 +42,7 @@ export function ValuesPanel({ run, graph, aid }: Props) {
   const whose = own ? isolated(own) : engineWords(run);
   const onlySent = found.values.some(({ from }) => from === "sent");
   return (
-    <aside className={style.values} aria-label={`Values of ${spokenName(found.name)}`}>
+    <aside className={style.values} aria-label={`Values of ${isolated(spokenName(found.name))}`}>
       <h2>
         {spokenName(found.name)}
         {!run.simulated && ` on ${whose}`}
