@@ -30,10 +30,13 @@ def texts(data: Path) -> dict[str, str]:
     found = documents(data)
     for document in found.values():
         document["info"]["version"] = ""
-    kept = {f"{name}.openapi.json": document for name, document in found.items()}
+    kept: dict[str, Any] = {f"{name}.openapi.json": each for name, each in found.items()}
+    kept["ready-made.json"] = ready_made()
+    # Alone for STOP, which names actions and loads nothing besides.
+    kept["ready-made-titles.json"] = {each.name: title_of(each.name) for each in READY_MADE}
     return {
         name: json.dumps(content, indent=1, ensure_ascii=False) + "\n"
-        for name, content in {**kept, "ready-made.json": ready_made()}.items()
+        for name, content in kept.items()
     }
 
 

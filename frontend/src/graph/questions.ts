@@ -1,11 +1,9 @@
 /** The ready-made actions that people answer, or for which the runner waits. */
 
-import templates from "../api/schema/ready-made.json";
+import titles from "../api/schema/ready-made-titles.json";
 
 /** Names of ready-made actions for people, by the names by which the runner knows them. */
-const READY_MADE: ReadonlyMap<string, string> = new Map(
-  templates.map(({ name, title }) => [name, title]),
-);
+const READY_MADE: ReadonlyMap<string, string> = new Map(Object.entries(titles));
 
 const WAITS: ReadonlySet<string> = new Set(["AaWait", "AaUntil"]);
 
