@@ -12,11 +12,12 @@ import pytest
 from sqlalchemy import make_url
 
 from action_assistant.errors import Conflict, Unavailable
-from action_assistant.journal.events import Addition, Draft, Event, nothing
+from action_assistant.journal.events import Addition, Draft, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.postgres import Postgres
 from action_assistant.journal.removal import StreamRemoved
 from journal.servers import Server
+from journal.whole_log import whole_log
 
 #: Events that each random writer appends.
 EVENTS = int(os.environ.get("SOAK_OVERTAKEN", "20"))
@@ -42,13 +43,6 @@ def draft(text: str = "x") -> Draft:
 
 async def opened(url: str, *, unlocked: int = 1_000_000) -> Journal:
     return await Journal.on(Unlocked(url, unlocked), branch="editor", fold=nothing)
-
-
-async def everything(journal: Journal) -> list[Event]:
-    stored: list[Event] = []
-    while page := await journal.read_all(after=stored[-1].position if stored else 0):
-        stored += page
-    return stored
 
 
 async def test_what_was_made_for_an_old_end_is_refused_alone(postgres: Server) -> None:
@@ -163,7 +157,7 @@ async def test_three_writers_whose_connections_are_cut_lose_double_and_damage_no
         await asyncio.sleep(dice.uniform(0.02, 0.1))
         await asyncio.to_thread(postgres.sql, cut, url.rpartition("/")[2])
     await asyncio.gather(*races)
-    stored = await everything(journals[0])
+    stored = await whole_log(journals[0])
     refused = sum((each.refused for each in racers), Counter())
     assert refused["not known"] == 0
     assert refused["conflict"] > 0

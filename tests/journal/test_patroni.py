@@ -19,6 +19,7 @@ from editor.process import running
 from editor.test_postgres import Hand, made, seen
 from journal.failover_cluster import Cluster, Node, are_installed, cluster
 from journal.test_postgres import Writers, draft, opened, until
+from journal.whole_log import whole_log
 
 FAILOVERS = int(os.environ.get("SOAK_FAILOVERS", "2"))
 
@@ -41,8 +42,7 @@ def with_patroni(nodes: Cluster, url: str) -> str:
 
 async def stored(journal: Journal) -> Counter[bytes]:
     """Return how often each body is in the log."""
-    events = await journal.read_all(limit=100_000)
-    return Counter(each.body for each in events)
+    return Counter(each.body for each in await whole_log(journal))
 
 
 async def lose_power(nodes: Cluster, node: Node) -> None:

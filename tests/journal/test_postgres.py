@@ -17,6 +17,7 @@ from action_assistant.journal.postgres import PostgresSession
 from action_assistant.schema import editor_tables
 from journal.proxy import Verdict, proxy
 from journal.servers import Server, binaries, server
+from journal.whole_log import whole_log
 
 STOPS = int(os.environ.get("SOAK_STOPS", "6"))
 CUTS = int(os.environ.get("SOAK_CUTS", "24"))
@@ -84,9 +85,7 @@ class Writers:
     async def check(self) -> None:
         """Check that nothing is lost or doubled, that there is no gap, and that the journal is
         sound."""
-        stored: list[Event] = []
-        while page := await self._journal.read_all(after=stored[-1].position if stored else 0):
-            stored += page
+        stored = await whole_log(self._journal)
         bodies = Counter(each.body for each in stored)
         assert self.open == 0
         assert [body for body in self.acknowledged if body not in bodies] == []

@@ -18,6 +18,7 @@ from action_assistant.journal.events import Addition, Event
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from journal.servers import Server
+from journal.whole_log import whole_log
 
 
 @pytest.fixture(params=["from SQLite", "from Postgres"])
@@ -57,9 +58,7 @@ async def everything(url: str) -> tuple[list[Event], dict[str, list[Any]]]:
     journal = await opened(url)
     try:
         assert await journal.verify() == []
-        events: list[Event] = []
-        while more := await journal.read_all(after=events[-1].position if events else 0):
-            events += more
+        events = await whole_log(journal)
         rows = {
             name: sorted(map(tuple, await journal.query(select(table))), key=repr)
             for name, table in editor_tables.EDITOR.tables.items()
@@ -105,7 +104,7 @@ async def test_each_concurrent_transaction_is_in_the_copy_wholly_or_not_at_all(
     count = await asyncio.to_thread(copied, source, target)
     writing.cancel()
     await asyncio.wait([writing])
-    whole = await journal.read_all(limit=100_000)
+    whole = await whole_log(journal)
     await journal.close()
     events, _ = await everything(target)
     assert len(whole) > len(events)
