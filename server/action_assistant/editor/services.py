@@ -11,6 +11,7 @@ from action_assistant.editor.catalogue.graph_pages import GraphPages
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.graph_rights import GraphRights
 from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.cluster.owners import Alone, Owners
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.course_search import CourseSearch
@@ -59,6 +60,7 @@ class EditorServices:
         workers: EditorWorkers,
         audit: AuditLog | None = None,
         people_files: PeopleFiles | None = None,
+        owners: Owners | None = None,
     ) -> None:
         keys = Keys.of(settings.data)
         self.settings = settings
@@ -68,7 +70,10 @@ class EditorServices:
         self.people = people
         self.workers = workers
         self.colours = PersonColours()
-        self.rooms = Rooms(journal, run_in_worker=workers.graphs, tried=workers.edits)
+        self.owners: Owners = owners or Alone()
+        self.rooms = Rooms(
+            journal, run_in_worker=workers.graphs, tried=workers.edits, owners=self.owners
+        )
         self.connection_limits = ConnectionLimits(limits=settings.limits, load=settings.load)
         self.rate_limits = ByteRateLimits(
             limits=settings.limits, per_minute=settings.load.mib_a_minute << 20

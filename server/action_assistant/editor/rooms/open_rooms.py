@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Final
 
+from action_assistant.editor.cluster.owners import Alone, Elsewhere, Here, Owners
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.rooms.batch import LONGEST, BatchWindow
@@ -18,12 +19,14 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
 _ANNOUNCEMENT_WINDOWS: Final = 10  # between two announcements of the sequence number
+_ELSEWHERE: Final = "Another editor has this graph open; try again."
 _SILENCE: Final = 10.0  # seconds without a message after which a socket is sent a heartbeat
 
 
 class Rooms:
     """Opens and unloads the rooms of this process, by stream. `run_in_worker` runs work that grows
-    with a document; `tried` runs trials of large updates before a room applies them."""
+    with a document; `tried` runs trials of large updates before a room applies them. `owners` says
+    which streams this editor owns; None for the only editor of its database."""
 
     def __init__(
         self,
@@ -33,8 +36,11 @@ class Rooms:
         window: float = LONGEST,
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
+        owners: Owners | None = None,
     ) -> None:
         self._journal = journal
+        self._owners: Final[Owners] = owners or Alone()
+        self._owners.when_lost(self._lose)
         self._run_in_worker = run_in_worker
         self._tried = tried
         self._window = BatchWindow(window)
@@ -161,6 +167,11 @@ class Rooms:
     async def _load(self, stream: str) -> Room:
         outlive_connection()  # others may wait for it, even if the first caller has left
         try:
+            match await self._owners.owner(stream):
+                case Here():
+                    pass
+                case Elsewhere():
+                    raise Unavailable(_ELSEWHERE)
             loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
             room = self._rooms[stream] = Room(
                 stream,
@@ -186,6 +197,13 @@ class Rooms:
             loop = asyncio.get_running_loop()
             self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
 
+    def _lose(self, stream: str) -> None:
+        """End the room of a stream at once, since another editor owns it now. What its clients have sent
+        and was not acknowledged they send again, to that editor."""
+        room = self._rooms.get(stream)
+        if room is not None:
+            room.end()
+
     def _forget(self, room: Room) -> None:
         if self._rooms.get(room.stream) is room:
             del self._rooms[room.stream]
@@ -202,3 +220,5 @@ class Rooms:
         room = self._rooms.get(stream)
         if room is not None:
             await room.close_if_unused(lambda: stream in self._holders)
+            if stream not in self._rooms and stream not in self._loading:
+                await self._owners.give_up(stream)

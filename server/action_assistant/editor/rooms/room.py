@@ -388,6 +388,11 @@ class Room:
         if not self._ended:
             self._end(Unavailable(_CLOSING))
 
+    def end(self) -> None:
+        """Close all sockets at once, so that clients connect again. Edits that are being stored are not
+        acknowledged."""
+        self._end(Unavailable(_CLOSING))
+
     # --- batch after batch ----------------------------------------------------------------------
 
     def _enqueue(self, item: QueueItem) -> None:

@@ -1,0 +1,1 @@
+"""Several editors that share one database: each graph has one of them as its owner."""
