@@ -26,7 +26,7 @@ class Page:
     async def set(self, root: str, key: str, value: str) -> "asyncio.Task[int]":
         """Give a key a value; the edit is acknowledged when the task is done."""
         doc: Doc[Any] = Doc(client_id=self._client)
-        doc.apply_update(await self._room.read(lambda replica, _: replica.state()))
+        doc.apply_update((await self._room.now()).state)
         before = doc.get_state()
         shared: Map[Any] = doc.get(root, type=Map)
         shared[key] = value
@@ -50,4 +50,4 @@ def meanwhile(act: Callable[[Room], Awaitable[object]]) -> Iterator[None]:
 
 async def maps_in(room: Room) -> Maps:
     """Return a copy of what the document holds now."""
-    return copy.deepcopy(await room.read(lambda replica, _: maps_of(replica.doc)))
+    return copy.deepcopy(maps_of((await room.quiet()).doc))

@@ -64,7 +64,7 @@ async def made(services: EditorServices, *file: Any, **more: Any) -> str:
 async def rewritten(services: EditorServices, graph: str, graph_file: bytes) -> None:
     """Draw something else in the graph, as a person would."""
     async with services.rooms.enter(graph_stream(graph)) as room:
-        state = await room.read(lambda replica, _: replica.doc.get_update())
+        state = (await room.now()).state
         then = document_edits.first(codec.read(graph_file).graph)
         await room.submit(document_edits.restoring(state, then), "ada")
 

@@ -36,7 +36,7 @@ async def test_a_graph_with_such_an_update_in_its_log_opens_and_takes_edits(
         ada = Client("ada")
         async with rooms.enter(STREAM) as room:
             assert room.damaged is None
-            waiting = await room.read(lambda replica, _: replica.waiting)
+            waiting = (await room.quiet()).waiting
             assert waiting == (undefined_type(8, 3),)
             ada.join(room)
             await settle(ada)

@@ -26,7 +26,7 @@ async def going_back(journal: Journal, rooms: Rooms) -> Restoring:
 
 async def _now(rooms: Rooms) -> Maps:
     async with rooms.enter(graph_stream(GRAPH)) as room:
-        return await room.read(lambda replica, _: maps_of(replica.doc))
+        return maps_of((await room.quiet()).doc)
 
 
 def _without_comments(maps: Maps) -> bytes:
@@ -93,7 +93,7 @@ async def _edit(rooms: Rooms, who: str, root: str, **values: object) -> int:
             me.map(root)[key.replace("__", "|")] = value
 
     async with rooms.enter(graph_stream(GRAPH)) as room:
-        state = await room.read(lambda replica, _: replica.doc.get_update())
+        state = (await room.now()).state
         return await room.submit(difference(state, edit), who)
 
 
@@ -132,7 +132,7 @@ async def test_an_action_that_was_deleted_comes_back_with_its_arrows(
     seq = await _edit(rooms, "ada", "actions", **{f"{dock}__in/speed": '{"pvf_value":2}'})
     before = await _now(rooms)
     async with rooms.enter(graph_stream(GRAPH)) as room:
-        ada.hear(await room.read(lambda replica, _: replica.doc.get_update()))
+        ada.hear((await room.now()).state)
         for root in ("actions", "relations"):
             for key in [k for k in ada.map(root) if dock in k]:
                 del ada.map(root)[key]

@@ -24,7 +24,7 @@ async def test_a_look_ends_where_answering_fails(
         monkeypatch.setattr(room_module, "answer_requests", fails)
         async with asyncio.timeout(2):
             with pytest.raises(Unavailable):
-                await room.read(lambda _, seq: seq)
+                await room.now()
 
 
 async def test_a_look_ends_where_the_document_cannot_be_loaded_anew(
@@ -42,10 +42,10 @@ async def test_a_look_ends_where_the_document_cannot_be_loaded_anew(
         await settle(eve)
         monkeypatch.setattr(Replica, "take", panics)
         monkeypatch.setattr(Room, "_reload", fails)
-        looking = [asyncio.create_task(room.read(lambda _, seq: seq))]
+        looking = [asyncio.create_task(room.now())]
         await asyncio.sleep(0)  # it enters before the edit, and has to wait for the same document
         eve.deliver(messages.change(updates(("a", "1"))[0]))
-        looking.append(asyncio.create_task(room.read(lambda _, seq: seq)))
+        looking.append(asyncio.create_task(room.now()))
         async with asyncio.timeout(2):
             found = await asyncio.gather(*looking, return_exceptions=True)
         assert [type(each) for each in found] == [Unavailable] * 2

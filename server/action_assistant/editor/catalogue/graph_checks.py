@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.editor.catalogue.graph_facts import CountsInside, Facts, GraphFacts
 from action_assistant.editor.catalogue.graph_names import GraphNames, NamedGraph
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.documents import contents, document
+from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo, Inside
 from action_assistant.editor.documents.thumbnails import digest_of
 from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
@@ -325,7 +325,7 @@ class GraphChecks:
         if it needs too much memory."""
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and kind == "graph":
-            return await room.read(lambda replica, _: document.name_of(replica.doc))
+            return await room.name()
         return _name_in((await self._about(graph, newest, of_any_version=True)).info, kind)
 
     async def _known_names(

@@ -38,11 +38,7 @@ class GraphReader:
         if room is None:
             newest = await self._newest(graph)
             return self._moments.get((graph, newest)) or await self._loaded(graph, newest)
-        found = await room.read(
-            lambda replica, seq: (
-                self._moments.get((graph, seq)) or GraphAtSeq(graph, seq, replica.state())
-            )
-        )
+        found = GraphAtSeq(graph, *await room.now())
         return self._moments.put((graph, found.seq), found)
 
     async def at(self, graph: str, seq: int) -> GraphAtSeq:

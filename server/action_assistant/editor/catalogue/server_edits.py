@@ -45,7 +45,7 @@ async def store(
     BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable if the
     room is closed or the edit cannot be stored."""
     for tries_left in reversed(range(_TRIES)):
-        state, before = await room.read(lambda replica, seq: (replica.state(), seq))
+        before, state = await room.now()
         computed = await compute(state, before)
         try:
             expected = before if tries_left or not insists else None

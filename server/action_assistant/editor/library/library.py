@@ -395,10 +395,10 @@ class LibraryEdits:
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
     """Return the graph in this room if its last change is still the one that a person has seen
     (`moment`); raise Conflict if not."""
-    found = await room.read(lambda replica, seq: GraphAtSeq(moment.graph, seq, replica.state()))
+    found = await room.now()
     if found.seq != moment.seq:
         raise _changed(moment, found.seq)
-    return found
+    return GraphAtSeq(moment.graph, *found)
 
 
 def _changed(moment: GraphMoment, seq: int, what: DocumentKind = "graph") -> Conflict:

@@ -5,7 +5,7 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from contextvars import Context
-from typing import Any, Final, TypeAlias, TypeVar
+from typing import Final, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 from pycrdt import merge_updates
@@ -142,14 +142,26 @@ class ComparisonRequest(msgspec.Struct, frozen=True):
     shown: messages.CompareMessage
 
 
-class ReadRequest(msgspec.Struct, frozen=True):
-    """A request of the server to call `see(document, seq)` when the whole document is committed;
-    `done` gets the result."""
+class DocumentState(NamedTuple):
+    """A committed document as one Yjs update (`state`), and the number of its last change."""
 
-    see: Callable[[Replica, int], Any]
-    done: "asyncio.Future[Any]"
+    seq: int
+    state: bytes
 
 
+class StateRequest(msgspec.Struct, frozen=True):
+    """The server asks for the document when all earlier edits are committed."""
+
+    done: "asyncio.Future[DocumentState]"
+
+
+class NameRequest(msgspec.Struct, frozen=True):
+    """The server asks for the name of the graph when all earlier edits are committed."""
+
+    done: "asyncio.Future[str]"
+
+
+ReadRequest: TypeAlias = StateRequest | NameRequest
 QueueItem: TypeAlias = SubmittedEdit | SyncRequest | ComparisonRequest | ReadRequest
 
 

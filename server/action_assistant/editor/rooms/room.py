@@ -11,7 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Coroutine, Iterator, Sequence
 from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from prometheus_client import Histogram, Metric
 from prometheus_client.registry import Collector
@@ -24,6 +24,7 @@ from action_assistant.editor.crdt.replica import Replica, UpdateEffect
 from action_assistant.editor.crdt.trial import adds_nothing
 from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES
+from action_assistant.editor.documents.document import name_of
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
     LARGE,
@@ -31,10 +32,13 @@ from action_assistant.editor.rooms.batch import (
     BatchOutcome,
     BatchWindow,
     ComparisonRequest,
+    DocumentState,
+    NameRequest,
     NotAllowed,
     Objection,
     QueueItem,
     ReadRequest,
+    StateRequest,
     SubmittedEdit,
     SyncRequest,
     adds_nothing_aside,
@@ -62,8 +66,6 @@ from action_assistant.web.server.direct import framed
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
-
-T = TypeVar("T")
 
 _ACK_BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30)
 #: Intervals that an announcement waits for an update to go along with.
@@ -239,10 +241,11 @@ def _send_document(request: SyncRequest, replica: Replica, seq: int) -> None:
 def _answer_read(request: ReadRequest, replica: Replica, seq: int) -> None:
     if request.done.done():  # the caller has left
         return
-    try:
-        request.done.set_result(request.see(replica, seq))
-    except Exception as error:  # noqa: BLE001 - the reader's own
-        request.done.set_exception(error)
+    match request:
+        case StateRequest(done):
+            done.set_result(DocumentState(seq, replica.state()))
+        case NameRequest(done):
+            done.set_result(name_of(replica.doc))
 
 
 class Room:
@@ -354,15 +357,24 @@ class Room:
         self._enqueue(SubmittedEdit(update, author, None, done, origin=origin, expected=expected))
         return await done
 
-    async def read(self, see: Callable[[Replica, int], T]) -> T:
-        """Call `see(document, seq)` once all earlier edits are committed, and return its result.
-        `seq`: the number of the newest change. `see` must neither change the document nor keep it.
-        Raise what `see` raises, or Unavailable if the room is closed."""
+    async def now(self) -> DocumentState:
+        """Return the document once all earlier edits are committed. Raise Unavailable if the room
+        is closed."""
+        request = StateRequest(self._loop.create_future())
+        self._ask(request)
+        return await request.done
+
+    async def name(self) -> str:
+        """Return the name of the graph once all earlier edits are committed; "" if it has none.
+        Raise Unavailable if the room is closed."""
+        request = NameRequest(self._loop.create_future())
+        self._ask(request)
+        return await request.done
+
+    def _ask(self, request: ReadRequest) -> None:
         if self._ended:
             raise Unavailable(_CLOSING)
-        done: asyncio.Future[T] = self._loop.create_future()
-        self._enqueue(ReadRequest(see, done))
-        return await done
+        self._enqueue(request)
 
     async def quiet(self) -> Replica:
         """Wait until no edit is being stored, and return the document, which is the committed one
@@ -505,7 +517,7 @@ class Room:
                     outcome.sync_requests.append(item)
                 case ComparisonRequest():
                     outcome.comparisons.append(item)
-                case ReadRequest():
+                case StateRequest() | NameRequest():
                     outcome.reads.append(item)
             if outcome.panicked:
                 self._waiting = [*batch[n + 1 :], *self._waiting]

@@ -60,7 +60,7 @@ class Editor:
 
     async def now(self, graph: str) -> Maps:
         async with self.rooms.enter(h.graph_stream(graph)) as room:
-            return await room.read(lambda replica, _: maps_of(replica.doc))
+            return maps_of((await room.quiet()).doc)
 
     async def edit(self, graph: str, who: str, dice: random.Random, edits: int = 1) -> None:
         """Edit at random as one person, and remember which values they gave to which keys."""
@@ -68,7 +68,7 @@ class Editor:
             before = await self.now(graph)
             async with self.rooms.enter(h.graph_stream(graph)) as room:
                 me = Person(who, dice)
-                me.hear(await room.read(lambda replica, _: replica.doc.get_update()))
+                me.hear((await room.now()).state)
                 for update in me.edit():
                     await room.submit(update, who)
             self._remember(who, before, await self.now(graph))
@@ -87,7 +87,7 @@ class Editor:
                     me.map(root)[key] = value
 
         async with self.rooms.enter(h.graph_stream(graph)) as room:
-            state = await room.read(lambda replica, _: replica.doc.get_update())
+            state = (await room.now()).state
             return await room.submit(difference(state, edit), who)
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
