@@ -88,7 +88,8 @@ function CloseButton({ robot }: { robot: string }) {
   );
 }
 
-function stateWords({ state, waits, by_itself }: QueueEntry): string {
+function stateWords({ state, waits, by_itself, obstacle }: QueueEntry): string {
+  if (obstacle) return obstacle;
   if (state === "closed") {
     const closed = waits.filter(({ why }) => why === "closed");
     return closed.map(({ robot }) => `The queue of ${robotWords(robot)} is closed.`).join(" ");
@@ -124,7 +125,7 @@ function Line({ entry, place, before, afterNext, isLast }: LineProps) {
       <div className={style.head}>
         <span className="ink3">{place}</span>
         <b className="fill">
-          <bdi>{entry.graph_name}</bdi> {named(entry)}
+          <bdi>{entry.graph_name}</bdi> {entry.engine !== "" && named(entry)}
         </b>
         <span className="quiet-12">
           <bdi>{entry.author.name}</bdi>, {day(at, now)} {clock(at)}
@@ -132,7 +133,9 @@ function Line({ entry, place, before, afterNext, isLast }: LineProps) {
       </div>
       {values.length > 0 && <p className="m-0 quiet-12">With {values.join(", ")}.</p>}
       <p className={style.state}>{stateWords(entry)}</p>
-      {entry.waits.length === 0 && mayStart && !entry.hidden && <Turn entry={entry} />}
+      {entry.waits.length === 0 && !entry.obstacle && mayStart && !entry.hidden && (
+        <Turn entry={entry} />
+      )}
       {isOwn && (
         <div className={style.buttons}>
           {mayRise && (

@@ -272,8 +272,11 @@ async def test_an_opened_run_is_expected_and_repeated_as_it_went_with_what_is_in
     assert isinstance(first, Requested)
     saved = expected_runs.of_run(found, first.umrf, "x", ANN, 1, first.subgraphs)
     now = bytes(start.umrf)
-    (course,) = check_courses([saved], now, subgraphs=start.subgraphs).courses
+    checked = check_courses([saved], now, subgraphs=start.subgraphs)
+    (course,), covered = checked.courses, checked.coverage
     assert (course.same, course.why) == (True, "")
+    assert {each.outcome for each in course.taken} == {"on_true"}
+    assert (covered.taken, covered.visited) == (len(course.taken), 2) == (3, covered.actions)
     other = sent(going_on(TASK), going_on(shared(sequence("Pick", 3), "Scout", "Carrier")))
     (course,) = check_courses([saved], now, subgraphs=other.subgraphs).courses
     assert course.same is False

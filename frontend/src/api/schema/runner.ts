@@ -852,7 +852,7 @@ export interface RunnerApi {
      * EntryShown
      * @description A start that waits. `robots`: those that may move, none in the simulator; `differs`: sentences
      *     about what is no longer as it was when it was put there; `ready_at`: since when it may be started;
-     *     `hidden`: the reader may not see its graph.
+     *     `hidden`: the reader may not see its graph; `obstacle`: why it can only be removed, "" for all others.
      */
     EntryShown: {
         id: string;
@@ -877,6 +877,7 @@ export interface RunnerApi {
         differs: string[];
         ready_at: string | null;
         hidden: boolean;
+        obstacle: string;
     };
     /**
      * EntryStarted

@@ -2,7 +2,7 @@
 cover. Runs in workers."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
 
 import msgspec
@@ -24,6 +24,8 @@ from action_assistant.umrf.courses.coverage import (
     ArrowCoverage,
     OutcomeArrow,
     TakenArrows,
+    arrows_taken,
+    arrows_taken_opened,
     coverage,
 )
 from action_assistant.umrf.courses.expected import check_expected
@@ -33,6 +35,7 @@ from action_assistant.umrf.json.text import JsonObject
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from action_assistant.umrf.semantics.script import script_json
+from action_assistant.umrf.semantics.trace import Trace
 
 #: Seconds of processor time for all courses of a graph.
 BUDGET_S: Final = 10.0
@@ -134,17 +137,23 @@ def _checked(
     was = codec.read(saved.umrf.encode()).graph
     script = script_from(msgspec.json.decode(saved.script))
     inside = inside or graphs_in(saved.subgraphs)
+    arrows_in: Callable[[Graph, Sequence[Trace]], TakenArrows] = arrows_taken
     if saved.opened:
         try:
-            now = opened(now, inside).graph
+            found = opened(now, inside)
         except CannotOpen as why:
             return msgspec.structs.replace(unchecked, same=False, why=str(why)), None
-    check = check_expected(was, saved.course, script, now, inside)
+        tops = {name: levels[0].key for name, levels in found.paths.items()}
+        whole, now = now, found.graph
+
+        def arrows_in(flat: Graph, traces: Sequence[Trace]) -> TakenArrows:
+            return arrows_taken_opened(whole, flat, tops, traces)
+
+    check = check_expected(was, saved.course, script, now, inside, arrows_in)
     same = check.apart is None
-    arrows = tuple(sorted(check.taken.arrows)) if not saved.opened else ()
+    arrows = tuple(sorted(check.taken.arrows))
     course = msgspec.structs.replace(unchecked, same=same, why=check.why, taken=arrows)
-    # The arrows of an opened graph are others than those that people see.
-    return course, check.taken if same and not saved.opened else None
+    return course, check.taken if same else None
 
 
 def propose(

@@ -257,7 +257,9 @@ def kept_in(events: Iterable[Event]) -> StartRequest:
     try:
         return start_of(msgspec.json.decode(kept, type=QueueStartKept).start)
     except msgspec.DecodeError as damaged:
-        raise Unavailable("The start of this entry cannot be read.") from damaged
+        raise Unavailable(
+            "This cannot be started, remove it: its start cannot be read."
+        ) from damaged
 
 
 def order_of(request: QueueRequest) -> str:

@@ -36,10 +36,12 @@ class Entry:
     """A start in the queue. `by`: in whose name it may start by itself; `waits`: why it waits, empty when
     its turn has come; `ready_at`: since when that is so, µs UTC; `differs`: what is no longer as its
     person saw it, by the look of the runner; `turn`: one start, or removal, at a time; `became`: the first
-    run of a start on several robots, which leaves the queue when all of them have been tried."""
+    run of a start on several robots, which leaves the queue when all of them have been tried; `obstacle`:
+    why it can only be removed, "" for all others. Such an entry is in no queue, and keeps nobody waiting."""
 
-    def __init__(self, entered: QueueEntered) -> None:
+    def __init__(self, entered: QueueEntered, obstacle: str = "") -> None:
         self.entered = entered
+        self.obstacle = obstacle
         self.by: tuple[Author, Identity] | None = None
         self.waits: tuple[Waiting, ...] = ()
         self.ready_at: int | None = None
@@ -55,7 +57,7 @@ class Entry:
     @property
     def queue_names(self) -> tuple[str, ...]:
         """The names of the queues in which it waits."""
-        return queue_names_of(self.entered.robots)
+        return () if self.obstacle else queue_names_of(self.entered.robots)
 
     @property
     def often(self) -> InQueue | None:

@@ -45,13 +45,11 @@ from action_assistant.runner.queues.entry import (
     digest_of,
     entered_of,
     entry_id,
-    kept_in,
     looked_of,
     named,
     order_of,
     queue_names_of,
     request_of,
-    require_as_asked,
     require_openable,
     require_queueable,
     require_waitable,
@@ -61,6 +59,7 @@ from action_assistant.runner.queues.entry import (
     waits_of,
 )
 from action_assistant.runner.queues.robot_queue import Entry, Look, RobotQueue
+from action_assistant.runner.queues.stored_entries import read_entries, start_in
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.doubts import Doubt
 from action_assistant.runner.runs.events import Author, StoredKind, draft_of
@@ -180,8 +179,9 @@ class Queues:
         """Return the one start of an entry. Raise BadInput if a person watches a robot that does not
         move, Conflict for what cannot be started, Unavailable if it cannot be read."""
         watched_in(watching, entry.entered.robots)
-        start = kept_in(await self._journal.read(stream_of(entry.id)))
-        require_as_asked(entry.entered, start)
+        if entry.obstacle:
+            raise Conflict(entry.obstacle)
+        start = start_in(entry.entered, await self._journal.read(stream_of(entry.id)))
         return msgspec.structs.replace(start, request_id=request_of(entry.id), watching=watching)
 
     async def _look(
@@ -370,7 +370,7 @@ class Queues:
             return
         busy = {name: tuple(self._busy(name)) for name in self._queues}
         closed = {name for name, queue in self._queues.items() if not queue.is_open}
-        entries, is_changed = tuple(self._entries), False
+        entries, is_changed = tuple(each for each in self._entries if not each.obstacle), False
         every = waits_of([each.queue_names for each in entries], closed, busy)
         for entry, waits in zip(entries, every, strict=True):
             if entry.waits != waits or (entry.ready_at is None) == (not waits):
@@ -505,6 +505,8 @@ class Queues:
     def _require_turn(self, entry: Entry) -> int:
         """Return since when it is the turn of an entry, µs UTC. Raise Conflict if it has to wait."""
         self._survey()
+        if entry.obstacle:
+            raise Conflict(entry.obstacle)
         for each in entry.waits:
             closed = self._queues[each.robot].closed if each.why == "closed" else None
             where: dict[str, object] = {"robot": each.robot, "why": each.why}
@@ -675,12 +677,7 @@ class Queues:
         made has left the queue, even if that could not be stored."""
         for opened in self._control.shown.values():
             self._run_changed(opened)
-        for row in await self._journal.query(queries.waiting(QueueStartKept.kind, QueueLeft.kind)):
-            if row.kind == QueueEntered.kind:
-                try:
-                    self._entries.append(Entry(msgspec.json.decode(row.body, type=QueueEntered)))
-                except msgspec.DecodeError:
-                    log.exception("%s cannot be read", row.stream)
+        self._entries += await read_entries(self._journal)
         for entry in tuple(self._entries):
             rows = await self._journal.query(queries.of_start(request_of(entry.id)))
             if rows:

@@ -39,7 +39,7 @@ class WaitingShown(msgspec.Struct, frozen=True, kw_only=True):
 class EntryShown(msgspec.Struct, frozen=True, kw_only=True):
     """A start that waits. `robots`: those that may move, none in the simulator; `differs`: sentences
     about what is no longer as it was when it was put there; `ready_at`: since when it may be started;
-    `hidden`: the reader may not see its graph."""
+    `hidden`: the reader may not see its graph; `obstacle`: why it can only be removed, "" for all others."""
 
     id: str
     graph: str | None
@@ -57,9 +57,11 @@ class EntryShown(msgspec.Struct, frozen=True, kw_only=True):
     differs: tuple[str, ...]
     ready_at: datetime | None
     hidden: bool
+    obstacle: str
 
     def __post_init__(self) -> None:
         hold_names(self, "graph_name")
+        hold_names(self, "obstacle")
 
 
 class QueueClosedShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -142,11 +144,13 @@ def _entry(
         "digest": entered.digest,
         "values": entered.values,
         "differs": entry.differs if entry.ready_at is not None else (),
+        "obstacle": entry.obstacle,
     }
     if is_hidden:
         blank = {"graph": None, "graph_name": HIDDEN_NAME, "version": "", "digest": ""}
-        shown = blank | {"values": {}, "differs": ()}
-    state: EntryState = "changed" if entry.differs else "ready"
+        obstacle = "It can only be removed." if entry.obstacle else ""
+        shown = blank | {"values": {}, "differs": (), "obstacle": obstacle}
+    state: EntryState = "changed" if entry.differs or entry.obstacle else "ready"
     if entry.waits:
         state = "closed" if entry.waits[0].why == "closed" else "waiting"
     return EntryShown(

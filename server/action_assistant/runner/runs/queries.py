@@ -132,13 +132,13 @@ def kinds_of_repeats(but: str) -> Select[Any]:
 
 
 def waiting(but: str, left: str) -> Select[Any]:
-    """Select stream, kind and body of the events of all entries of the queue that have not left it, the
-    oldest first, without those of the kind `but`. `left`: the kind that says that one has left."""
+    """Select the events of all entries of the queue that have not left it, the oldest first, without those
+    of the kind `but`. `left`: the kind that says that one has left."""
     event, other = runner_event.c, runner_event.alias("other")
     is_left = exists(
         select(other.c.seq).where(other.c.stream == event.stream, other.c.kind == left)
     )
-    chosen = select(event.stream, event.kind, event.body).where(
+    chosen = select(event.stream, event.kind, event.author, event.at, event.body).where(
         event.stream > "queue/", event.stream < "queue0", event.kind != but, ~is_left
     )
     return chosen.order_by(event.position)

@@ -4,7 +4,8 @@ An arrow is taken when its parent ends with that outcome and the engine asks the
 response other than to ignore it, whether or not the child is ready (docs/contracts.md 5.1, `edge`).
 """
 
-from collections.abc import Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 import msgspec
@@ -84,24 +85,63 @@ def outcomes_of(relation: Relation) -> list[Precondition]:
 def arrows_taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
     """Return the arrows of this graph that were taken and its actions that ran, according to the
     trace events of one course or run (`traces`). Events of its sub-graphs are not counted."""
+    arrows: set[OutcomeArrow] = set()
+    actions: set[Key] = set()
+    for event in _events(graph, traces):
+        if isinstance(event, OutcomeArrow):
+            arrows.add(event)
+        else:
+            actions.add(event)
+    return TakenArrows(frozenset(arrows), frozenset(actions))
+
+
+def arrows_taken_opened(
+    graph: Graph, flat: Graph, tops: Mapping[str, Key], traces: Iterable[Trace]
+) -> TakenArrows:
+    """Return the arrows of a graph that were taken, and its actions that ran, according to the trace events
+    of a course with its sub-graphs opened. `flat`: the opened graph; `tops`: by the full name of each of
+    its actions the key of the action of `graph` in whose place it stands. An arrow after a sub-graph is
+    taken with the outcome of the action that ends the sub-graph: of the last one, where several have to."""
+    top = {each.key: tops[each.full_name] for each in flat.actions} | {ENTRY: ENTRY, EXIT: EXIT}
+    awaited: defaultdict[tuple[Key, Key], set[Key]] = defaultdict(set)
+    for relation in flat.relations:
+        if relation.required:
+            awaited[top[relation.parent], relation.child].add(relation.parent)
+    ended: defaultdict[tuple[Key, Key], set[Key]] = defaultdict(set)
+    own = frozenset(arrows_of(graph))
+    arrows: set[OutcomeArrow] = set()
+    actions: set[Key] = set()
+    for event in _events(flat, traces):
+        if not isinstance(event, OutcomeArrow):
+            actions.add(top[event])
+            continue
+        place = top[event.parent], event.child
+        if event.parent in awaited[place]:
+            ended[place].add(event.parent)
+            if ended[place] != awaited[place]:
+                continue
+            ended[place].clear()
+        arrows.add(OutcomeArrow(top[event.parent], top[event.child], event.outcome))
+    return TakenArrows(own.intersection(arrows), frozenset(actions))
+
+
+def _events(graph: Graph, traces: Iterable[Trace]) -> Iterator[OutcomeArrow | Key]:
+    """Yield each arrow of a graph as it is taken, and each action, by key, as it runs."""
     keys = {a.full_name: a.key for a in graph.actions if not a.missing}
     ends = keys | {ENTRY_NODE: ENTRY, EXIT_NODE: EXIT}
     labels = {f"{p} => {c}": (ends[p], ends[c]) for p, c in _pairs(graph, ends)}
     outcomes: dict[str, Precondition] = {outcome: outcome for outcome in PRECONDITIONS}
-    arrows: set[OutcomeArrow] = set()
-    actions: set[Key] = set()
     for trace in traces:
         match trace:
             case EdgeEval(graph=graph.name, edge=edge, eval=answer) if edge in labels:
                 result, _, response = answer.partition(" -> ")
                 outcome = outcomes.get(result)
                 if outcome is not None and response != "ignore":
-                    arrows.add(OutcomeArrow(*labels[edge], outcome))
+                    yield OutcomeArrow(*labels[edge], outcome)
             case NodeStateEvent(graph=graph.name, node=node, state="RUNNING") if node in keys:
-                actions.add(keys[node])
+                yield keys[node]
             case _:
                 pass
-    return TakenArrows(frozenset(arrows), frozenset(actions))
 
 
 def _pairs(graph: Graph, ends: dict[str, Key]) -> Iterator[tuple[str, str]]:

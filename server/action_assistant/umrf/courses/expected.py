@@ -1,7 +1,7 @@
 """Compares an expected course with another version of its graph. Actions are matched by key, so
 that a renamed action still counts as the same. Pure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 from msgspec.structs import replace
@@ -21,6 +21,7 @@ from action_assistant.umrf.semantics.steps import (
     steps_of,
     unnamed,
 )
+from action_assistant.umrf.semantics.trace import Trace
 
 
 class CourseCheck(msgspec.Struct, frozen=True):
@@ -45,11 +46,13 @@ def check_expected(
     script: Script,
     now: Graph,
     inside: Mapping[str, Graph] | None = None,
+    arrows_in: Callable[[Graph, Sequence[Trace]], TakenArrows] = arrows_taken,
 ) -> CourseCheck:
     """Simulate the graph `now` under the script of a course that its earlier version `was` took,
     and compare the new course with that `course`.
 
-    `inside`: the graphs that can be sub-graphs of `now`, by name.
+    `inside`: the graphs that can be sub-graphs of `now`, by name; `arrows_in`: finds the arrows that are
+    taken in its course.
     """
     old = {action.full_name: action.key for action in was.actions}
     new = _identities(was, now)
@@ -68,7 +71,7 @@ def check_expected(
     )
     apart = departure(keyed(unnamed(course), old), keyed(unnamed(steps_of(traces)), new))
     names = {key: name for name, key in old.items()} | names
-    return CourseCheck(None if apart is None else _named(apart, names), arrows_taken(now, traces))
+    return CourseCheck(None if apart is None else _named(apart, names), arrows_in(now, traces))
 
 
 def _identities(was: Graph, now: Graph) -> dict[str, Key]:
