@@ -81,10 +81,10 @@ function Way({ to, Sign, onClose, children }: WayProps) {
 }
 
 interface Props {
-  /** For who may: the bar of a narrow screen has no room for a button of its own. */
+  /** Opens *Share*; null for those who may not. The bar of a narrow screen has no room for a button of its own. */
   onShare: (() => void) | null;
   onClose: () => void;
-  /** Before the page goes: what of this person is to leave the device. */
+  /** Called before the page goes; removes from the device what is to leave it with this person. */
   onLeave: (person: string) => Promise<void>;
 }
 

@@ -86,8 +86,10 @@ const PATIENCE = 5_000; // ms until a device shows what it keeps
  */
 const known = (before: Person | null) => currentPerson(before === null ? undefined : PATIENCE);
 
-/** Let a person in who has given a name in this browser before; ask others for a name first. A personal
- * link is used only when its person says so, since it works once. */
+/**
+ * Let a person in who has given a name in this browser before; ask others for a name first. A personal
+ * link is used only when its person says so, since it works once.
+ */
 async function knockInvited(key: Credential): Promise<Gate> {
   const invited = await readInvitation(key.text);
   if (invited.name != null) return { at: "invited", key, invited };
@@ -105,7 +107,10 @@ const WITHDRAWN =
 
 const visitOf = (gate: Gate): number => (gate.at === "inside" ? gate.visit : 0);
 
-/** Whoever is inside stays the same object while they are the same: nothing below begins anew. */
+/**
+ * Returns the open gate. The person stays the same object while nothing about them changes, so that nothing below
+ * begins anew.
+ */
 function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
   const known = gate.at === "inside" ? gate.person : null;
   const same = known?.id === person.id && known.name === person.name && known.role === person.role;

@@ -104,7 +104,10 @@ export function useGraphPages(wanted: GraphsWanted): GraphPages {
   };
 }
 
-/** The graphs with these ids as lists show them, as far as they are there, renewed all the time. */
+/**
+ * The graphs with these ids (200 at most) as lists show them, without those that are gone; asked for again all the
+ * time.
+ */
 export function useSomeGraphs(ids: readonly string[]) {
   const first = [...new Set(ids)].sort().slice(0, 200);
   return useQuery({

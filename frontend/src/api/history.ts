@@ -111,8 +111,10 @@ export function revertEdits(
   return editor.post("/api/graphs/{graph_id}/revert", { path: inGraph(id), body });
 }
 
-/** Reads again what is on screen. An edit of ours is shown before what it was is written down: what is being read
- * may be from between, and is given up, since the library would keep the first answer of a moment. */
+/**
+ * Reads again what is on screen. An edit of ours is shown before what it was is written down: what is being read
+ * may be from between, and is given up, since the library would keep the first answer of a moment.
+ */
 export async function refreshHistory(client: QueryClient, id: string): Promise<void> {
   const all = { queryKey: ["history", id] };
   await client.cancelQueries(all);
@@ -166,7 +168,7 @@ async function asked(runner: string, run: Run, graph: string): Promise<SinceAnsw
   return { good, found: await editor.post("/api/graphs/{graph_id}/since", { path, body }) };
 }
 
-/** Asked once it is wanted; a run that is over is never asked about again. */
+/** Asks once, when it is `wanted`, which changes after the last good run altered the course of the graph. */
 export function useSince(runner: string | undefined, run: Run, wanted: boolean) {
   const { graph } = run;
   return useQuery({

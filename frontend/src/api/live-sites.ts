@@ -154,7 +154,7 @@ export class LiveSites implements Live {
     }));
   }
 
-  /** What becomes of an open run of a silent site is unknown. */
+  /** Returns an open run of a silent site as *unknown*: nobody knows what becomes of it. */
   #runOf(run: Run, { state }: SiteState): Run {
     if (state.link === "live" || run.ended_at !== null) return run;
     const since = new Date(serverTimeOf(state.since)).toISOString();
@@ -165,7 +165,7 @@ export class LiveSites implements Live {
     }));
   }
 
-  /** The same object again while nothing has changed, so that it is not drawn again. */
+  /** Returns the same object again while nothing has changed, so that it is not drawn again. */
   #doubt<T extends Run | Robot>(said: T, since: number, made: () => T): T {
     const known = this.#doubted.get(said);
     if (known?.since === since) return known.shown as T;

@@ -161,13 +161,16 @@ export function cancelDeviceCode(code: string): Promise<unknown> {
   return editor.delete("/api/devices/codes/{code}", { path: { code } });
 }
 
-/** The link of a person as a picture. */
+/**
+ * Return the address of a picture (QR code) of the link of a person. `origin`: where the link leads, as
+ * "https://host:port".
+ */
 export function memberCodeUrl(person: string, origin: string): string {
   const path = `/api/members/${encodeURIComponent(person)}/qr`;
   return serverPath(`${path}?origin=${encodeURIComponent(origin)}`);
 }
 
-/** The code of a device as a picture. */
+/** Return the address of a picture (QR code) with which a device is added. `origin`: as for `memberCodeUrl`. */
 export function deviceCodeUrl(code: string, origin: string): string {
   const path = `/api/devices/codes/${encodeURIComponent(code)}/qr`;
   return serverPath(`${path}?origin=${encodeURIComponent(origin)}`);

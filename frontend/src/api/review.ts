@@ -90,7 +90,7 @@ export function listRuns(
   return runnerAt(runner).get("/api/runs", { query, signal });
 }
 
-/** Asked again when the run changes its state. */
+/** Asks for the causes of the end of a run that needs an explanation, again when its state changes. */
 export function useCauses(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "causes", run.id, run.state, run.alarms.length],
@@ -106,7 +106,7 @@ export function needsExplanation(run: Run): boolean {
   return run.ended_at !== null || run.state === "unknown" || run.alarms.length > 0;
 }
 
-/** Takes in the recorded runs that the product brings along; their ids. */
+/** Import the recorded runs that the product brings along. Returns their ids. */
 export function importExamples(runner: string): Promise<string[]> {
   return runnerAt(runner).post("/api/examples", {});
 }

@@ -8,8 +8,10 @@ export type Person = EditorApi["Person"] & { readonly personal?: boolean };
 
 const NAME_KEY = "aa.name";
 
-/** Credential for signing in: the server's token, an invitation (`ID.SECRET`), or the code that another
- * device of the person shows. */
+/**
+ * Credential for signing in: the server's token, an invitation (`ID.SECRET`), or the code that another
+ * device of the person shows.
+ */
 export interface Credential {
   readonly kind: "token" | "invitation" | "device";
   readonly text: string;
@@ -60,12 +62,12 @@ function isPerson(kept: unknown): kept is Person {
   return typeof id === "string" && typeof name === "string" && String(role) in ROLE_WORDS;
 }
 
-/** Whom the runner takes somebody for. */
+/** Returns a text that is another one when the runner takes somebody for another person, name or role. */
 export function identityOf({ id, role, name }: Person): string {
   return `${id} ${role} ${name}`;
 }
 
-/** Null: from now on nobody is shown anything here without a server. */
+/** Stores who is signed in, for a page that opens without a server; null: nobody is shown anything then. */
 export function rememberPerson(person: Person | null): void {
   if (person === null) localStorage.removeItem(PERSON_KEY);
   else localStorage.setItem(PERSON_KEY, JSON.stringify(person));
@@ -92,8 +94,10 @@ export const personIn = ({ person, personal }: EditorApi["SignedIn"]): Person =>
 
 const DEVICE_LOOK = 1_000; // ms between two questions whether this device is confirmed
 
-/** Signs this device in by the code that another one shows. Calls `onWaiting` with the number that both
- * show, and waits until the person has confirmed it there. Throws `Refusal` if they do not. */
+/**
+ * Signs this device in by the code that another one shows. Calls `onWaiting` with the number that both
+ * show, and waits until the person has confirmed it there. Throws `Refusal` if they do not.
+ */
 export async function signInByCode(
   code: string,
   onWaiting: (waiting: EditorApi["WaitingDevice"]) => void,
@@ -115,9 +119,11 @@ export async function currentPerson(timeoutMs = 20_000): Promise<Person> {
 
 const FAREWELL_KEY = "aa.farewell";
 
-/** Ends the session at the editor, and at a runner that has a data folder of its own. Where they share
+/**
+ * Ends the session at the editor, and at a runner that has a data folder of its own. Where they share
  * one, either does for both; the page cannot know, so that of one which was not told it is said
- * afterwards (`takeFarewell`). Throws when neither could. */
+ * afterwards (`takeFarewell`). Throws when neither could.
+ */
 export async function signOut(runner: string | undefined): Promise<void> {
   const [editor, other] = await Promise.allSettled([
     endSession("The editor", ""),

@@ -1,4 +1,4 @@
-/** Which site has what: as the live sockets say it, and as answers have shown it. */
+/** Knows which site has which robots and runs, by the live sockets and by earlier answers. */
 import { isolated } from "../words/isolated";
 import type { Site } from "./sites";
 

@@ -121,7 +121,7 @@ interface Answer {
   readonly value: unknown;
 }
 
-/** What is not known of one site does not hide the others. Throws the error of the first site if none answers. */
+/** Returns the answers of the sites that answer. Throws the error of the first site if none does. */
 async function answersOf(
   ask: AskSite,
   otherFor: (site: Site) => Parameters<AskSite>[1] = () => undefined,

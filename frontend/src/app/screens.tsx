@@ -36,7 +36,7 @@ export const StatisticsScreen = lazyPart(() => review().then((part) => part.Stat
 /** The page of a link that shows one thing: no screen leads there. */
 export const ViewScreen = lazyPart(() => review().then((part) => part.ViewScreen));
 
-/** By how the path begins below the page's root; the last one is whatever is left. */
+/** The screens by the beginning of the path below the page's root; the last one is for all other paths. */
 const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "preload">])[] = [
   ["/graphs/", GraphScreen],
   ["/runs", RunsScreen],

@@ -56,7 +56,7 @@ export function changesOf(given: ChangesInput, now: Maps): readonly GraphChange[
   return changes.sort((a, b) => ORDER.indexOf(a.thing) - ORDER.indexOf(b.thing));
 }
 
-/** Only the keys of these changes. */
+/** Returns the part of a difference that has only the keys of these changes. */
 export function onlyChanges(
   difference: ValuesByRoot,
   changes: readonly GraphChange[],

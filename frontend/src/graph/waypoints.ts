@@ -27,7 +27,7 @@ export function readWaypoints(text: JsonText): readonly Position[] {
 export const isBent = ({ waypoints }: Relation): boolean =>
   waypoints.some(([, text]) => readWaypoints(text).length > 0);
 
-/** By how much both ends of a relation have moved together; null where they have not. */
+/** Returns by how much both ends of a relation have moved together, px; null if they have not. */
 export function movedTogether(
   { parent, child }: Pick<Relation, "parent" | "child">,
   moved: ReadonlyMap<Key, Position>,

@@ -1,4 +1,4 @@
-/** With what a moment is compared: any other one that has a name, and what robots run now. */
+/** Chooses what a moment is compared with: another one that has a name, or a version that robots run now. */
 import { NativeSelect } from "@mantine/core";
 import { useMemo } from "react";
 import { versionName } from "../api/graphs";

@@ -24,7 +24,7 @@ export interface ChangedThing {
   readonly key: string;
   readonly thing: "graph" | "action" | "arrow" | "note";
   readonly change: ChangeMark["change"];
-  /** Only where it stands or how it is led is another. */
+  /** True if only its place, or the way of its line, has changed. */
   readonly looks: boolean;
   readonly name: string;
   readonly lines: ReturnType<typeof linesOf>;
@@ -90,7 +90,7 @@ function oldValues(before: Action, after: Action): ReadonlyMap<string, string> {
   return new Map(found);
 }
 
-/** By the later of two things, which stays the same object from step to step: what it was compared with. */
+/** Caches comparisons by the later of two things, which stays the same object from step to step. */
 class Remembered<T> {
   readonly #found = new WeakMap<object, { readonly before: unknown; readonly is: T }>();
 

@@ -185,7 +185,7 @@ function markOf(fields: readonly FieldChange[] | null): SinceMark | null {
 export class SinceMarker {
   readonly #actions: ReadonlyMap<string, Action>;
   readonly #relations: ReadonlyMap<string, Relation>;
-  /** By what it is now, which is the same object as long as it is the same. */
+  /** Marks by the present action or relation, which stays the same object while it does not change. */
   readonly #known = new WeakMap<Action | Relation, SinceMark | null>();
   #last: ReadonlyMap<string, SinceMark> = new Map();
 
@@ -194,7 +194,7 @@ export class SinceMarker {
     this.#relations = new Map(before.relations.map((each) => [relationId(each), each]));
   }
 
-  /** By key of an action and id of a relation; the same map as long as nothing else is marked. */
+  /** Returns the marks by key of an action and id of a relation; the same map while no mark changes. */
   marks(now: Graph): ReadonlyMap<string, SinceMark> {
     const found = new Map<string, SinceMark>();
     for (const each of now.actions) {

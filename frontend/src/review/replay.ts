@@ -201,7 +201,7 @@ export function runAfter(run: Run, frame: Frame): Run {
   return next;
 }
 
-/** Before its first event: everything that was sent, nothing that came of it. */
+/** Returns a run as it was before its first event: everything that was sent, nothing that came of it. */
 export function runBefore(run: Run): Run {
   const actions: Record<string, ActionRun> = {};
   for (const [name, action] of Object.entries(run.actions ?? {})) {

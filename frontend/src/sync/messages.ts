@@ -16,7 +16,7 @@ export const QUERY_AWARENESS = 3;
 export const ACK = 100;
 /** Comparison: a fingerprint of the document, first the page's, then the server's. */
 export const COMPARE = 101;
-/** Read only: a sentence that says why nobody may change this document. */
+/** The kind of a message: read only, with a sentence that says why nobody may change this document. */
 export const READ_ONLY = 102;
 /** Epoch: the name of the history of the graph. */
 export const EPOCH = 103;

@@ -154,12 +154,12 @@ export function boundedPart<P extends object>(
 
 const over = (notice: ReactNode) => <div className={style.over}>{notice}</div>;
 
-/** For what opens over the page: its notices stand in the middle of the screen. */
+/** Wraps lazy parts that open over the page: *loading* and *not loaded* stand in the middle of the screen. */
 export function OverlayBoundary({ children }: { children: ReactNode }) {
   return <PartBoundary frame={over}>{children}</PartBoundary>;
 }
 
-/** For what opens at a button, which stays as it is until the part brings its own. */
+/** Wraps a lazy part that opens at a button: `button` is shown until the part brings its own. */
 export function OpeningBoundary({ button, children }: { button: ReactNode; children: ReactNode }) {
   const beside = (notice: ReactNode) => (
     <>

@@ -105,7 +105,8 @@ def _names(path: str) -> list[str]:
 
 def tell_runner_rules(server: Server) -> None:
     """Bring the rules of who may see graphs to a runner that may have a data folder of its own, if
-    there was ever one and this client is an owner's. Only owners change who may see a graph."""
+    there was ever one and this client is an owner's. Only owners change who may see a graph.
+    Raise RequestRefused if that fails."""
     try:
         rules = server.editor("GET", "/api/graph-rules").json()
     except RequestRefused as refused:

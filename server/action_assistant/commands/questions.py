@@ -12,7 +12,7 @@ from action_assistant.safe_text import one_line
 
 
 def add_questions(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the two commands to `commands`, the sub-commands of `runs`."""
+    """Add `questions` and `answer` to `commands`, the sub-commands of `runs`."""
     asks = command(
         commands, "questions", "what runs ask people now, or what one run has asked", "RUN --json"
     )

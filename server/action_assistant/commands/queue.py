@@ -38,7 +38,8 @@ def is_asked(options: argparse.Namespace) -> bool:
 def put(server: Server, start: dict[str, Any], options: argparse.Namespace) -> int:
     """Put a start into the queue of its robots, print its id and why it waits, and return 0. `start`:
     the body of a request to start. Nothing waits for its turn: in the simulator it starts by itself,
-    on robots a person starts it."""
+    on robots a person starts it. Raise CannotStart for an option that does not
+    fit or without an answer, RequestRefused if the runner refuses."""
     if options.watching:
         raise CannotStart("--watching is said when it starts: queue start ENTRY --watching ROBOT.")
     moves = bool(set(start.get("robots", {}).values() or {start["engine"]}) - {"simulator"})

@@ -86,7 +86,7 @@ class Inbox(msgspec.Struct, frozen=True):
 
 
 class FoundMentions(msgspec.Struct, frozen=True):
-    """The persons whom one event of a graph mentions in the comment `key`."""
+    """The persons whom one event of a graph mentions in the comment `key`. `at`: microseconds UTC."""
 
     seq: int
     author: str

@@ -14,8 +14,9 @@ export interface RunnerApi {
     };
     /**
      * ActionFrame
-     * @description The change of an action. Its visits from number `first` on (counted from 0, over all its
-     *     visits) are now `visits`; `messages` are new.
+     * @description The change of an action. `state`: its new state, as the engine names it. Its visits from number
+     *     `first` on (counted from 0, over all its visits) are now `visits`; `messages` are new. `aid`: its
+     *     key in the document, null if unknown.
      */
     ActionFrame: {
         state: string;
@@ -2481,8 +2482,10 @@ export interface RunnerApi {
      * Robot
      * @description An engine as people see it. `why`: explains any state but `answering`.
      *
-     *     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
-     *     besides this runner. `actions`, `graphs`: the size of its index; null before its first answer.
+     *     `heard_at`, `took_ms`: when its last answer came, and after how many milliseconds; `restarted_at`:
+     *     when its last restart was seen, null for none; `holds`: the graphs in its last answer. `servers`:
+     *     how many engines answer on the path of its get; `others`: publishers of starts besides this
+     *     runner. `actions`, `graphs`: the size of its index; null before its first answer.
      *     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
      *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
      *     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
@@ -3417,7 +3420,8 @@ export interface RunnerApi {
     };
     /**
      * ThereMessage
-     * @description Asks a page of an operator to answer if it is visible, while a robot asks for such pages.
+     * @description Asks a page of an operator to answer if it is visible, while a robot asks for such pages. The
+     *     answer repeats `number`, which is another one for each question.
      */
     ThereMessage: {
         /** @enum {string} */

@@ -101,7 +101,10 @@ async function replaceKnown(known: readonly KnownFile[]): Promise<string[]> {
 const MOST_TOLD = 5;
 const PROGRESS = "files-taken";
 
-/** After a second: few files are taken before anybody has read it. */
+/**
+ * Returns the notice of an import of `count` files: `tell` shows how many are done, `end` hides it. It appears
+ * after 0.7 s, since a few files are taken before anybody could read it.
+ */
 export function progressOf(count: number): { tell: (done: number) => void; end: () => void } {
   let shown = false;
   const start = tick();
@@ -135,7 +138,10 @@ function complain(failed: readonly string[]): void {
   });
 }
 
-/** Asked, since others may have edited them; the history leads back. */
+/**
+ * Offers to replace the graphs that came from these files. People are asked, since others may have edited them;
+ * the history leads back.
+ */
 function offerReplacing(known: readonly KnownFile[], after: () => void): void {
   if (known.length === 0) return;
   const id = `known-${known.map(({ document }) => document).join(" ")}`;

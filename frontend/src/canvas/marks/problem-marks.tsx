@@ -16,7 +16,7 @@ export type ProblemMarks = ReadonlyMap<string, ProblemMark>;
 
 export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 
-/** Return the marks of all places on the canvas to which problems refer. */
+/** Return the marks of all places on the canvas to which errors and warnings refer. Notes get none. */
 export function problemMarksOf(told: readonly ProblemGroup[]): ProblemMarks {
   const places = new Map<string, ProblemGroup[]>();
   for (const each of told) {

@@ -158,7 +158,7 @@ function around(graph: Graph, key: Key): { before: Relation[]; next: Relation[] 
   };
 }
 
-/** Renames an action; it keeps its number unless another action of the new name has it. */
+/** Renames an action; it keeps its number unless another action of the new name has it. False when it is gone. */
 export function rename(doc: Y.Doc, key: Key, name: string): boolean {
   if (!hasAction(doc, key)) return false;
   asOneEdit(doc, () => {
@@ -222,7 +222,7 @@ export function setField<F extends keyof ActionFields>(
   return true;
 }
 
-/** Makes a ghost an action of the graph, with its arrows as they are. */
+/** Makes a ghost an action of the graph, with its arrows as they are. False when it is gone. */
 export function adoptGhost(doc: Y.Doc, key: Key, like: Omit<NewAction, "name"> = {}): boolean {
   if (!hasAction(doc, key)) return false;
   asOneEdit(doc, () => {

@@ -133,7 +133,7 @@ export function reply(doc: Y.Doc, thread: string, words: Words): void {
   write(doc, thread, { author, at, text: said, ...named(mentions) });
 }
 
-/** Only a comment that mentions somebody has the field: the server looks for its name. */
+/** Returns the field of a comment that mentions somebody, no field for another: the server looks for its name. */
 const named = (mentions: readonly string[] = []) => (mentions.length > 0 ? { mentions } : {});
 
 /** Says that a thread is done, or that it is not. */

@@ -120,7 +120,7 @@ export function safeFixes<P extends Fixable>(problems: readonly P[]): P[] {
   });
 }
 
-/** All that lose nothing, as one step of undo. Returns how many did something. */
+/** Applies all fixes that lose nothing, as one step of undo. Returns how many did something. */
 export function applySafeFixes(doc: Y.Doc, problems: readonly Fixable[]): number {
   return asOneEdit(doc, () => safeFixes(problems).filter((one) => applyFix(doc, one)).length);
 }
@@ -130,7 +130,7 @@ export function exampleFixes<P extends Fixable>(problems: readonly P[]): P[] {
   return problems.filter((problem) => fixOf(problem) === "take-example");
 }
 
-/** All that take an example, as one step of undo. Returns how many did something. */
+/** Applies all fixes that take an example, as one step of undo. Returns how many did something. */
 export function applyExamples(doc: Y.Doc, problems: readonly Fixable[]): number {
   return asOneEdit(doc, () => exampleFixes(problems).filter((one) => applyFix(doc, one)).length);
 }

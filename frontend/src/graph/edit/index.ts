@@ -20,7 +20,7 @@ export { asOneEdit, undoOf } from "./document-writes";
 export * from "./parameters";
 export * from "./relations";
 
-/** A graph is never gone for its own page: these answer true. */
+/** Renames the graph. Returns true, as edits do whose thing still exists: a graph is never gone for its own page. */
 export function setGraphName(doc: Y.Doc, name: string): true {
   asOneEdit(doc, () => {
     writeKey(doc, "meta", "name", name);
@@ -29,7 +29,7 @@ export function setGraphName(doc: Y.Doc, name: string): true {
   return true;
 }
 
-/** Calls the action of a document of the library otherwise, and so the document. */
+/** Renames the action of a document of the library, and the document with it. False when it is gone. */
 export function renameDocument(doc: Y.Doc, key: Key, name: string): boolean {
   return asOneEdit(doc, () => rename(doc, key, name) && setGraphName(doc, name));
 }
@@ -42,7 +42,7 @@ export function setGraphDescription(doc: Y.Doc, description: string): true {
   return true;
 }
 
-/** Says where what follows is drawn; down is what documents mean that say nothing. */
+/** Sets whether the graph is drawn downwards or to the right; a document that says nothing means down. */
 export function setDirection(doc: Y.Doc, direction: Direction): void {
   asOneEdit(doc, () => {
     const now = rootOf(doc, "meta").get("direction") === "right" ? "right" : "down";
@@ -53,7 +53,7 @@ export function setDirection(doc: Y.Doc, direction: Direction): void {
 }
 
 /**
- * Writes where things stand, once, when they are dropped: actions, `ENTRY` and `EXIT`. Bends of lines
+ * Writes the places (px) of actions, `ENTRY` and `EXIT`, once, when they are dropped. Bends of lines
  * whose two ends move by the same way move along.
  */
 export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Position]>): void {
@@ -106,6 +106,7 @@ export function addNote(doc: Y.Doc, text: JsonText): string {
   return id;
 }
 
+/** Writes the JSON of a note or frame. False when it is gone. */
 export function setNote(doc: Y.Doc, id: string, text: JsonText): boolean {
   if (!rootOf(doc, "positions").has(noteKey(id))) return false;
   asOneEdit(doc, () => writeKey(doc, "positions", noteKey(id), text));

@@ -66,13 +66,13 @@ export function notesOf(graph: Graph): readonly Note[] {
   return read;
 }
 
-/** Adds one and returns its key. */
+/** Adds a note or frame and returns its key. */
 export function writeNote(doc: Y.Doc, note: NewNote): string {
   return noteKey(addNote(doc, textOf(note, {})));
 }
 
 /**
- * Changes one; members that others wrote into it stay. False when it is gone.
+ * Changes a note or frame; members that others wrote into it stay. False when it is gone.
  *
  * A note is one text, so it is the document's newest that changes: what a page shows may be older.
  */
@@ -88,7 +88,7 @@ function textOf({ kind, at, size, text, color }: NewNote, others: object): JsonT
   return JSON.stringify({ ...others, kind, at, size, text, color });
 }
 
-/** Moves several as one edit. */
+/** Moves several notes and frames as one edit. */
 export function placeNotes(doc: Y.Doc, graph: Graph, places: ReadonlyMap<string, Position>): void {
   asOneEdit(doc, () => {
     for (const { key, at } of notesOf(graph)) {

@@ -60,6 +60,7 @@ export function addParameter(
   return true;
 }
 
+/** Removes a parameter, and what a start asks about it. False when it is gone. */
 export function removeParameter(doc: Y.Doc, key: Key, side: ParameterSide, path: string): boolean {
   if (!exists(doc, key, side, path)) return false;
   asOneEdit(doc, () => {
@@ -145,7 +146,7 @@ function arrowOf(doc: Y.Doc, id: string) {
   return graphNow(doc).relations.find((relation) => relationId(relation) === id);
 }
 
-/** Brings outputs along an arrow to inputs, renamed where the names differ, as one edit. */
+/** Brings outputs along an arrow to inputs, renamed where the names differ, as one edit. False when it is gone. */
 export function takeOutputs(doc: Y.Doc, id: string, ties: readonly Tie[]): boolean {
   const relation = arrowOf(doc, id);
   if (relation === undefined) return false;

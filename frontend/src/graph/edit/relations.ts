@@ -131,7 +131,7 @@ function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Respons
   });
 }
 
-/** Sets whether the child waits until this parent has reported. */
+/** Sets whether the child waits until this parent has reported. False when the relation is gone. */
 export function setRequired(doc: Y.Doc, id: string, required: boolean): boolean {
   return edit(doc, id, () => {
     if (required) eraseKeys(doc, "relations", `${id}|required`);
@@ -141,7 +141,10 @@ export function setRequired(doc: Y.Doc, id: string, required: boolean): boolean 
   });
 }
 
-/** Under which name an output of the parent reaches the child; null: under its own. */
+/**
+ * Sets the name under which an output of the parent reaches the child (null: its own). False when the relation
+ * is gone.
+ */
 export function setRemap(doc: Y.Doc, id: string, source: string, target: string | null): boolean {
   return edit(doc, id, () => {
     if (target === null) eraseKeys(doc, "relations", `${id}|remap/${source}`);
@@ -151,7 +154,7 @@ export function setRemap(doc: Y.Doc, id: string, source: string, target: string 
   });
 }
 
-/** Makes a relation that a file listed on one side only known to both. */
+/** Lists a relation on both sides that a file had on one only. False when it is gone. */
 export function mirrorRelation(doc: Y.Doc, id: string): boolean {
   return edit(doc, id, () => eraseKeys(doc, "relations", `${id}|only`));
 }
@@ -260,7 +263,10 @@ export function swapOrder(doc: Y.Doc, ids: readonly string[], one: number, other
   });
 }
 
-/** Puts an action into an arrow: it takes over what the arrow said, and its success leads on. */
+/**
+ * Puts an action into an arrow: it takes over what the arrow said, and its success leads on. False, without a
+ * change, when the arrow is gone or ends at the action.
+ */
 export function insertInto(doc: Y.Doc, id: string, key: Key): boolean {
   return asOneEdit(doc, () => keepingWaits(doc, () => putBetween(doc, id, key)));
 }
@@ -291,7 +297,7 @@ export const setExit = (doc: Y.Doc, key: Key, outcome: Precondition = "on_true")
 
 export const unsetExit = (doc: Y.Doc, key: Key): boolean => disconnect(doc, key, EXIT);
 
-/** Removes every arrow from one to the other. */
+/** Removes every arrow from one action to another. False when there was none. */
 export function disconnect(doc: Y.Doc, parent: Key, child: Key): boolean {
   return asOneEdit(doc, () => {
     numberGhosts(doc);

@@ -63,7 +63,10 @@ function hasJoin(doc: Y.Doc): boolean {
   return false;
 }
 
-/** Makes all outputs of this action optional, so that the end of the graph does not wait for them. */
+/**
+ * Makes all outputs of this action optional, so that the end of the graph does not wait for them. False
+ * when it waits for none.
+ */
 export function setOutputsOptional(doc: Y.Doc, key: Key): boolean {
   const action = graphNow(doc).actions.find((candidate) => candidate.key === key);
   const waited = action?.outputs.filter(({ text }) => isWaitedFor(text)) ?? [];

@@ -141,7 +141,10 @@ export interface Touched {
   readonly consumers: readonly Key[];
 }
 
-/** Whom a parameter ties to whom: who gives it, and who takes the same. `path`: of its side. */
+/**
+ * Returns the actions that a parameter ties together: those that give it and those that take it. `path`: its path
+ * on its side.
+ */
 export function touchedBy(flow: DataFlow, key: Key, side: "in" | "out", path: string): Touched {
   if (side === "in") {
     const producers = takenGivers(flow.get(key)?.get(path)).map(({ parent }) => parent);

@@ -200,7 +200,11 @@ export function othersNotice(now: LiveState): StopNoticeText {
 
 const UNREACHED = 6_000; // ms that the runner may take to answer before a page says that it does not
 
-/** Stop looks as always: where it would reach nobody that has to be said before it is needed. */
+/**
+ * Return the notice that a Stop would reach nobody, or that nothing would prove it; null while the link is live and in
+ * the first 6 s without it. STOP itself looks as always, so this is said before it is needed. `at`: the present by
+ * `tick`, ms.
+ */
 export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   if (now.link === "live" || at - now.since < UNREACHED) return null;
   const { kind, why } = now.unreached ?? { kind: "silent", why: "The runner does not answer." };

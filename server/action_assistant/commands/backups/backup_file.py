@@ -52,7 +52,7 @@ class JournalCopy(msgspec.Struct, frozen=True):
 
 
 class BackupPart(msgspec.Struct, frozen=True):
-    """A file in a backup."""
+    """A file in a backup: its size, and its SHA-256 in hex."""
 
     bytes: int
     sha256: str
@@ -61,7 +61,8 @@ class BackupPart(msgspec.Struct, frozen=True):
 class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
     """The description that a backup holds of itself.
 
-    `database` is where the graphs were, without a password; None means the data folder. `commit` is
+    `made_at` is in seconds since 1970. `database` is where the graphs were, without a password; None
+    means the data folder. `commit` is
     that of the version, None if unknown. `schemas` holds the revisions of the tables, `settings`
     those of the environment without the token, and `missing` one sentence for each missing part.
     """

@@ -87,8 +87,8 @@ class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class Catalogue:
     """Lists, makes, changes and deletes graphs and actions of the library. Its methods raise
-    NotFound for an id that is unknown or deleted. `author`: the id of the person for whom it acts.
-    """
+    NotFound for an id that is unknown or deleted, Unavailable while the journal cannot be used.
+    `author`: the id of the person for whom it acts."""
 
     def __init__(
         self,

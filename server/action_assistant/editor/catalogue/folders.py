@@ -41,7 +41,8 @@ class Folder(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Folders:
-    """All folders of graphs. Its methods raise NotFound for an id that is unknown."""
+    """All folders of graphs. Its methods raise NotFound for an id that is unknown, Unavailable
+    while the journal cannot be used."""
 
     def __init__(self, journal: Journal, rights: GraphRights) -> None:
         self._journal = journal

@@ -99,7 +99,8 @@ async def sees_every_graph(_: str) -> bool:
 
 
 class GraphChecks:
-    """Checks graphs, with the graphs inside of them. All that it stores is a cache."""
+    """Checks graphs, with the graphs inside of them. All that it stores is a cache. Its methods raise
+    Unavailable while the journal cannot be read."""
 
     def __init__(
         self,

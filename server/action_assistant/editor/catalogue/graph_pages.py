@@ -91,7 +91,8 @@ class LabelCount(msgspec.Struct, frozen=True):
 
 
 class GraphPages:
-    """Answers queries about the graphs that an identity may see, without drafts and deleted ones."""
+    """Answers queries about the graphs that an identity may see, without drafts and deleted ones. Its
+    methods raise Unavailable while the journal cannot be read."""
 
     def __init__(
         self,

@@ -69,7 +69,8 @@ class Rules(NamedTuple):
 
 class GraphRights:
     """Knows the rule of each graph and folder. Nothing is asked of the database while there is no
-    rule. `file`: where the runner finds the rules; `keys` seal them."""
+    rule. `file`: where the runner finds the rules; `keys` seal them. Methods that ask the journal
+    raise Unavailable while it cannot be read."""
 
     def __init__(self, journal: Journal, rooms: Rooms, file: RulesFile, keys: Keys) -> None:
         self._journal = journal

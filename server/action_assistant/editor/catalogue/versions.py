@@ -100,7 +100,8 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Versions:
-    """Publishes, releases and lists versions of graphs."""
+    """Publishes, releases and lists versions of graphs. Its methods raise Unavailable while the
+    journal cannot be read or written."""
 
     def __init__(
         self,

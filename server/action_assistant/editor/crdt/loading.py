@@ -288,8 +288,9 @@ class Loaded(msgspec.Struct, frozen=True):
 
 
 class Stored(msgspec.Struct, frozen=True):
-    """A document read from the log, as the bytes of a snapshot; empty if nothing was stored. The
-    other fields are those of `Loaded`."""
+    """A document read from the log up to `seq`, as the bytes of a snapshot; empty if nothing was
+    stored. `kept`: the seq of the stored snapshot that it was read from; `damaged`: why it ends
+    before the log does."""
 
     document: bytes
     seq: int

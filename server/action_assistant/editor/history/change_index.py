@@ -50,7 +50,8 @@ _TABLES: Final = (key_change, overwritten_value)
 
 class ChangeIndex:
     """Maintains an index, in the database, of the keys that each event of a graph changed. It is
-    derived from the log and may be deleted at any time."""
+    derived from the log and may be deleted at any time. Its methods raise Unavailable while the
+    journal cannot be read or written."""
 
     def __init__(self, journal: Journal, run_in_worker: RunInWorker = run_here) -> None:
         self._journal = journal

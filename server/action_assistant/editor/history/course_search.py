@@ -52,7 +52,7 @@ _SILENT: Final = frozenset({"description", "x/gui_attributes", "x", "in", "out"}
 class CourseParting(msgspec.Struct, frozen=True):
     """The change `seq` from which on the simulated course differs from the first one (`parts`), or
     equals it again. `place`, `before`, `after`: the first step, from 1, in which the courses
-    before and after this change differ, and that step in each, in words."""
+    before and after this change differ, and that step in each, in words. `at`: microseconds UTC."""
 
     seq: int
     author: str

@@ -179,7 +179,7 @@ class UpdatedGraph(msgspec.Struct, frozen=True):
 
 class LibraryEdits:
     """Carries out commands of people on actions of the library; the caller has checked their role.
-    `action`: the id of the document of an action; `author`: the id of the person."""
+    Its methods raise Unavailable while the journal cannot be read or written. `action`: the id of the document of an action; `author`: the id of the person."""
 
     def __init__(
         self,

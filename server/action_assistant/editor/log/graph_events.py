@@ -111,7 +111,7 @@ class GraphReverted(msgspec.Struct, frozen=True):
 class GraphAdapted(msgspec.Struct, frozen=True):
     """The edit `seq` made parameters equal to another document: the uses of an action in a graph to
     the library, or an action of the library to its use or to a file. `source`: that document, ""
-    for a file; `at`: its change; `name`: the action."""
+    for a file; `at`: the number (seq) of its change; `name`: the action."""
 
     seq: int
     source: str

@@ -191,7 +191,8 @@ class Member:
             self._news.set()
 
     def all_sent(self) -> None:
-        """Record that the messages that `gather` returned were sent."""
+        """Note that the messages that `gather` took out of the queue were sent. Until then no second
+        request for the document is answered, since the first answer is on its way."""
         if self._answer is _SyncState.LEFT:
             self._answer = _SyncState.NONE
 

@@ -1,7 +1,7 @@
 """Annotations of a run besides its own events: marks of people, sums after its end, its archive.
 
 They have a stream of their own, `about/RUN`, apart from what a robot did. The tables here are folds
-of these streams.
+of these streams. `at` is microseconds UTC.
 """
 
 import itertools

@@ -3,7 +3,7 @@ again.
 
 A recorded run becomes a script in which every action does what it was seen to do. An expectation is
 a graph, such a script and the course that they took; simulating it later, with a newer graph or a
-newer product, must take the same course.
+newer product, must take the same course. `at` is microseconds UTC.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

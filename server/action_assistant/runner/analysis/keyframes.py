@@ -122,7 +122,8 @@ class SnapshotJournal(RunnerJournal, Protocol):
 
 class KeyframeStore:
     """Makes, caches and stores the keyframes of runs (the run as it was after certain events). For
-    use in a worker process, since folding is slow."""
+    use in a worker process, since folding is slow. Its methods raise Unavailable while the journal
+    cannot be read."""
 
     def __init__(self, journal: SnapshotJournal) -> None:
         self._journal = journal

@@ -26,8 +26,9 @@ from action_assistant.runner.runs.visits import ActionRun
 
 
 class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The change of an action. Its visits from number `first` on (counted from 0, over all its
-    visits) are now `visits`; `messages` are new."""
+    """The change of an action. `state`: its new state, as the engine names it. Its visits from number
+    `first` on (counted from 0, over all its visits) are now `visits`; `messages` are new. `aid`: its
+    key in the document, null if unknown."""
 
     state: str
     first: int

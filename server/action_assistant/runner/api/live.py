@@ -140,7 +140,8 @@ class QueueMessage(msgspec.Struct, frozen=True, tag="queue", tag_field="type"):
 
 
 class ThereMessage(msgspec.Struct, frozen=True, tag="there", tag_field="type"):
-    """Asks a page of an operator to answer if it is visible, while a robot asks for such pages."""
+    """Asks a page of an operator to answer if it is visible, while a robot asks for such pages. The
+    answer repeats `number`, which is another one for each question."""
 
     number: int
 

@@ -1,4 +1,7 @@
-"""The raw messages of a robot from the time of a run: in the recordings, in an archive, or gone."""
+"""The raw messages of a robot from the time of a run: in the recordings, in an archive, or gone.
+
+Times are microseconds UTC.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime

@@ -89,8 +89,9 @@ class SubGraphs:
 
     def last_look(self, part: str, usual: LastLook) -> LastLook:
         """Return the times of the newest earlier answer that proves anything about the sub-graph
-        named `part`. That is `usual`, the newest one for the whole run, unless the sub-graph was
-        not counted as the run's then."""
+        named `part`, and forget what was noted for it: call this once for each answer. They are
+        those of `usual`, the newest one for the whole run, unless the sub-graph was not counted as
+        the run's then."""
         return self._passed_over.pop(part, usual)
 
     def _whose(

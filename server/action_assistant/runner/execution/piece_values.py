@@ -82,7 +82,7 @@ class PieceValues:
         )
 
     def lacking(self, ended: PieceEnded) -> str:
-        """Return, as the end of a sentence, which outputs a call that has ended did not set; "" if
+        """Return once, as the end of a sentence, which outputs a call that has ended did not set; "" if
         none is unset, or if that was reported before."""
         if not ended.unset or ended.how == "unsent" or (ended.node, ended.unset) in self._said:
             return ""

@@ -14,7 +14,8 @@ class Listeners(Generic[_News]):
         self._all: list[Callable[[_News], None]] = []
 
     def tell(self, news: _News) -> None:
-        """Call every listener with `news`, also one that another listener removes meanwhile."""
+        """Call every listener with `news`, also one that another listener removes meanwhile. An
+        exception of a listener reaches the caller, and those after it are not called."""
         for hear in tuple(self._all):
             hear(news)
 

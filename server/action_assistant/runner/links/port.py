@@ -3,7 +3,7 @@
 A `Link` is the connection to one engine; a `Reach` makes links to robots. When a command returns, its message
 has left; that says nothing about whether the engine obeyed. An implementation keeps messages on one topic as
 far apart as the engine needs (the runner may call `stop` for several graphs at once) and never repeats a
-start.
+start. `at` is microseconds UTC.
 """
 
 from collections.abc import Callable
@@ -156,7 +156,8 @@ class EngineLog(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):
-    """A report that the engine appeared, disappeared, or was replaced; `why` is for people."""
+    """A report that the engine appeared, disappeared, or was replaced. `incarnation`: the id of its
+    present life, "" if unknown; `why` is for people."""
 
     at: int
     state: EngineState

@@ -1,7 +1,7 @@
 """An entry of the queue: one start that waits for its robots. Pure.
 
 Its stream `queue/ID` says who put it there, what was looked at, and how it left the queue; the stream
-`queue-robot/NAME` says when the queue of a robot was closed, and opened again.
+`queue-robot/NAME` says when the queue of a robot was closed, and opened again. Times are microseconds UTC.
 """
 
 import hashlib

@@ -1,7 +1,8 @@
 """A repeat: one start that is carried out once for each of its cells, one after the other. Pure.
 
 Its stream `repeat/ID` says what was ordered, and when the repeat was closed and opened again. Its cells
-are runs, which name it: nothing else says that a cell was started.
+are runs, which name it: nothing else says that a cell was started. Times are
+microseconds UTC.
 """
 
 import hashlib

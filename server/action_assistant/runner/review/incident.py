@@ -1,6 +1,7 @@
 """Keeps a run as an incident: it stays in the journal, and one file holds all that is known of it.
 
-The file is a ZIP with fixed names inside; names that people and robots chose stand in JSON only.
+The file is a ZIP with fixed names inside; names that people and robots chose stand in JSON only. `at` is
+microseconds UTC.
 """
 
 import hashlib
@@ -132,7 +133,8 @@ def incident_times(connection: Connection) -> list[tuple[int, int]]:
 
 
 def event_lines(events: Sequence[Event]) -> tuple[bytes, Head]:
-    """Return the events of one stream as lines of JSON, and the end of the chain through them."""
+    """Return the events of one stream as lines of JSON, and the end of the chain through them. Raise
+    TooLarge if they are too many for one file."""
     head, out = NOTHING, io.BytesIO()
     for event in events:
         head = Head(event.seq, link(head.chain, event))

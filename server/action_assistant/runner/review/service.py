@@ -47,8 +47,8 @@ class NoteText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class ReviewService:
     """Stores the marks of people on runs, and runs the loops that work on stored runs. It sends no
-    commands. `queries` answers questions in workers; `next_number` returns the number for a new
-    run."""
+    commands. Its methods raise Unavailable while the journal cannot be read or written. `queries`
+    answers questions in workers; `next_number` returns the number for a new run."""
 
     def __init__(
         self,

@@ -122,7 +122,8 @@ def _event_json(event: Event) -> bytes:
 
 
 class StoredRuns:
-    """Answers questions about the runs in a journal and its archive, in one thread of its own."""
+    """Answers questions about the runs in a journal and its archive, in one thread of its own. Its
+    methods raise Unavailable while the journal or a file of the archive cannot be read."""
 
     def __init__(self, journal: ArchiveStore) -> None:
         self.keyframe_store = KeyframeStore(journal)

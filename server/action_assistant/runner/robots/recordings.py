@@ -80,7 +80,8 @@ class Recordings:
         self._texts: dict[str, dict[str, str]] = {}
 
     def record_answer(self, robot: str, answer: Answer) -> None:
-        """Record the graphs of an answer that have changed."""
+        """Queue the graphs of an answer that have changed, and the names of those that are gone since
+        the robot's last answer. `run` writes the queue; if it is full, the oldest line is lost."""
         before = self._texts.get(robot, {})
         changed = {name: text for name, text in answer.texts.items() if before.get(name) != text}
         gone = tuple(sorted(before.keys() - answer.texts.keys()))
@@ -91,8 +92,7 @@ class Recordings:
         self._waiting.append((robot, answer.at, msgspec.json.encode(line)))
 
     def record_feedback(self, robot: str, feedback: Feedback) -> None:
-        """Add feedback of a robot to what waits to be stored; ignore a message without
-        snapshots."""
+        """Queue feedback of a robot, as `record_answer` does; ignore a message without snapshots."""
         if feedback.snapshots:
             at = feedback.snapshots[-1].at
             line = FeedbackLine(at, feedback.actor, feedback.snapshots)

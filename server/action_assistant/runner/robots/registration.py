@@ -1,4 +1,4 @@
-"""The registration of a robot, and the view of a robot that pages get."""
+"""The registration of a robot, and the view of a robot that pages get. In events `at` is microseconds UTC."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -173,8 +173,10 @@ class HealthShown(msgspec.Struct, frozen=True, kw_only=True):
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why`: explains any state but `answering`.
 
-    `servers`: how many engines answer on the path of its get; `others`: publishers of starts
-    besides this runner. `actions`, `graphs`: the size of its index; None before its first answer.
+    `heard_at`, `took_ms`: when its last answer came, and after how many milliseconds; `restarted_at`:
+    when its last restart was seen, None for none; `holds`: the graphs in its last answer. `servers`:
+    how many engines answer on the path of its get; `others`: publishers of starts besides this
+    runner. `actions`, `graphs`: the size of its index; None before its first answer.
     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last

@@ -2,6 +2,7 @@
 
 All of this is pure. A change is decided on the value `RobotRights` and becomes one event, which carries
 the value after it; the newest events of a robot are its rights (docs/decisions/117).
+Times are microseconds UTC.
 """
 
 from collections.abc import Iterable, Iterator

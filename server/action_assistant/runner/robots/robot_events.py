@@ -2,7 +2,7 @@
 files written for it, changes of its rights.
 
 One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only ever added, with a
-default. Commands of this runner's own runs stand in the streams of the runs.
+default. Commands of this runner's own runs stand in the streams of the runs. Times are microseconds UTC.
 """
 
 from collections.abc import Iterable, Mapping

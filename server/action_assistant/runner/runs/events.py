@@ -221,7 +221,8 @@ class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=Tru
 
 
 class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A person wants the run stopped. This holds until the run has ended; nothing takes it back."""
+    """A person wants the run stopped. This holds until the run has ended; nothing takes it back.
+    `stop_id`: the id of the press, by which a repeat of it is recognised; "" if it has none."""
 
     kind: ClassVar[str] = "run.stop_requested.v1"
 

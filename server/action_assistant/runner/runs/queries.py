@@ -156,7 +156,8 @@ def newest_move(moved: str) -> Select[Any]:
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
     """The wanted runs; None in a field means any. `failed`: true for runs that were refused, lost,
     halted, or ended in error; false for other ended runs. `graph`: id or name; `person`: id or
-    part of a name; `text`: part of a name or message; `before`: the id of a run; `repeat`: of which
+    part of a name; `text`: part of a name or message; `since`, `until`:
+    microseconds UTC; `before`: the id of a run; `repeat`: of which
     they are cells."""
 
     graph: str | None = None

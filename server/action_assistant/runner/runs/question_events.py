@@ -1,4 +1,4 @@
-"""The events of a run about questions to people, and about waits of the runner."""
+"""The events of a run about questions to people, and about waits of the runner. Times are microseconds UTC."""
 
 from typing import ClassVar, Literal, TypeAlias
 

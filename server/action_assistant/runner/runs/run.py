@@ -1,4 +1,4 @@
-"""A run: all that is known of it, as one frozen value."""
+"""A run: all that is known of it, as one frozen value. Times are microseconds UTC."""
 
 from typing import Final, Literal, TypeAlias
 

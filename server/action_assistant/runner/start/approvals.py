@@ -2,7 +2,7 @@
 a start.
 
 An approval is a person's word about exactly one graph. It stands in a stream of its own, is never
-taken back, and says nothing about any other graph.
+taken back, and says nothing about any other graph. Times are microseconds UTC.
 """
 
 from collections import defaultdict, deque
@@ -239,8 +239,9 @@ class Approvals:
     ) -> Item | None:
         """Return the pre-flight item about approval; None where the robot asks for none. It passes
         when somebody else than the starter has approved one of these orders, by digest, with another
-        browser than the one of this request, and may still do so. Of a link for several people nobody knows how many use
-        it: who came by one is no second person (decision 126). `what`: the order in words."""
+        browser than that of this request, and may still do so. A person who came by a link for
+        several people is no second person (decision 126): nobody knows how many use it. `what`: the
+        order in words."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
         every = [each for digest in orders for each in await self.given_for(digest)]

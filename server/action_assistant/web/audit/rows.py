@@ -1,4 +1,6 @@
-"""Pages of the audit: rows that are read from the log of one process, the newest first."""
+"""Pages of the audit: rows that are read from the log of one process, the newest first. In facts `at` is
+microseconds UTC.
+"""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime

@@ -227,7 +227,8 @@ def _parts_in(body: bytes) -> Mapping[str, str | None]:
 
 
 class CertificateLook:
-    """Asks each hour for the certificate at a public address, whoever has issued it."""
+    """Asks once an hour for the certificate at a public address, whoever has issued it, and reports
+    one that ends within two weeks. Does nothing for an address without HTTPS."""
 
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)

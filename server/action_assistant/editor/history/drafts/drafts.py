@@ -94,7 +94,7 @@ class DraftPair(msgspec.Struct, frozen=True):
 
 class Drafts:
     """Makes, lists, proposes and answers drafts. Its methods raise NotFound for an id that is no
-    draft or is deleted. `author`: the id of the person for whom it acts."""
+    draft or is deleted, Unavailable while the journal cannot be used. `author`: the id of the person for whom it acts."""
 
     def __init__(
         self,

@@ -35,8 +35,8 @@ class BehaviourList(msgspec.Struct, frozen=True):
 
 
 class BehaviourFolder(msgspec.Struct, frozen=True):
-    """A folder of the administrator with behaviours: one Python file for each action that is played
-    by code in simulations."""
+    """A folder that the administrator keeps: one Python file for each action that code plays in
+    simulations."""
 
     path: Path
 
