@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from action_assistant.journal.events import Event
+from action_assistant.journal.slots import before_first, slot_of
 
 START: Final = bytes(16)
 _PLACE: Final = Struct(">qqq").pack
@@ -82,7 +83,8 @@ def _names(*texts: str) -> bytes:
 
 
 class Inspector:
-    """Checks all stored events in the order of their positions, and collects damage. `removed`:
+    """Checks all stored events, and collects damage. They come in the order of their positions; those of
+    several slots in one that keeps the order of each slot and of each stream. `removed`:
     returns which stream an event removes from the log, and the end of that stream; None for other
     events."""
 
@@ -93,7 +95,9 @@ class Inspector:
         self._removed = removed
         self._heads: dict[str, Head] = {}
         self._damages: dict[str, Damage] = {}
-        self._position = 0
+        self._position = 0  # the last one in the present slot
+        self._slot = 0
+        self._left: dict[int, int] = {}  # the last position in each other slot
         self._missing = 0  # positions at which there is nothing
         self._gone = 0  # events that were taken out
         self._gap: Damage | None = None  # the first
@@ -109,6 +113,8 @@ class Inspector:
             self._heads[stream] = Head(before.seq + 1, START)
             return
         event, chain = Event(*row[:7]), row[7]
+        if slot_of(event.position) != self._slot:
+            self._turn_to(slot_of(event.position))
         if event.seq != before.seq + 1:
             self._note(stream, before.seq + 1, f"{event.seq} stands in its place")
         elif chain != link(before.chain, event):
@@ -123,6 +129,12 @@ class Inspector:
         self._heads[stream] = Head(event.seq, chain)
         if stream not in self._damages and (taken := self._removed(event)) is not None:
             self._take_out(*taken)
+
+    def _turn_to(self, slot: int) -> None:
+        """Count positions in another slot from now on. The next event was counted in the present one."""
+        self._left[self._slot] = self._position - 1
+        self._slot = slot
+        self._position = self._left.get(slot, before_first(slot)) + 1
 
     def _take_out(self, stream: str, end: Head) -> None:
         """Record that a stream was removed from the log and ended at `end`. Its first events may

@@ -27,11 +27,13 @@ def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
 
 class Overtaken(Exception):
     """Another process has written to this database, so what this one knows of its streams is old.
-    `streams`: those of the statement that was refused; at least one of them has moved, or another
-    event has the position of one of their events."""
+    `streams`: those of the statement that was refused; at least one of them has moved. Or another
+    event has the position of one of their events (`by_position`), which only the writer of the same slot
+    could have stored."""
 
-    def __init__(self, streams: Iterable[str]) -> None:
+    def __init__(self, streams: Iterable[str], *, by_position: bool = False) -> None:
         self.streams: Final = tuple(streams)
+        self.by_position: Final = by_position
         super().__init__(
             "the log has another end than this process has read, as when another process writes to it"
         )
@@ -41,6 +43,15 @@ class WriterSession(Protocol):
     """The connection that writes. One thread at a time uses it, only inside `run`."""
 
     connection: Connection
+
+    @property
+    def slot(self) -> int:
+        """Return the slot in which this session stores events; 0 for the only writer of a log."""
+
+    @property
+    def is_shared(self) -> bool:
+        """Return whether other processes may write to this database at the same time, so that streams may
+        have moved on; `store` compares their epochs then."""
 
     def run(self, work: Callable[[], T]) -> T:
         """Call `work`, which uses this session, in the way that the database needs, and return its
@@ -55,11 +66,23 @@ class WriterSession(Protocol):
     def say(self, command: str) -> None:
         """Execute a command of SQL without a result, such as COMMIT or SAVEPOINT."""
 
-    def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
+    def store(
+        self,
+        events: Sequence[tuple[Event, bytes]],
+        known: Mapping[str, Head],
+        epochs: Mapping[str, int],
+    ) -> None:
         """Write events, each with its link of the hash chain, and the new ends of their streams:
         all or nothing. If no transaction is open, this is one of its own, which is committed.
-        `known`: the ends of their streams in the database, as the writer knows them. Raise Overtaken
-        if another process has moved one of them; nothing is written then."""
+        `known`: the ends of their streams in the database, as the writer knows them; `epochs`: those
+        of streams in a shared database. Raise Overtaken if another process has moved one of them or
+        has taken it; nothing is written then."""
+
+    def hold(self, streams: Sequence[str]) -> None:
+        """Begin a transaction in which no other process moves these streams."""
+
+    def abandon(self) -> None:
+        """Roll the transaction back that is open, if there is one."""
 
     def close(self) -> None:
         """Close the connection, whatever its state is; an open transaction is rolled back."""
@@ -113,6 +136,10 @@ class Database(Protocol):
         """Return whether an error is the fault of the database, so that nothing can be written, and
         not of the statement."""
 
+    def raced(self, error: Exception) -> bool:
+        """Return whether a statement failed only because another process wrote at the same time, so that
+        it may be tried again in a new transaction."""
+
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Call `question` with a connection that reads, and return its result; it does not wait for
         the writer."""
@@ -120,6 +147,10 @@ class Database(Protocol):
     async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
         """Call `question` with a connection that reads one consistent snapshot, while others write,
         and return its result. Nothing is changed, not even the tables of an older version."""
+
+    def slots(self, connection: Connection) -> list[int]:
+        """Return the slots whose events `scan` returns one slot after the other; one slot stands for a log
+        that `scan` returns in its own order."""
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Return a page of stored events, unchecked and with their links of the hash chain, after

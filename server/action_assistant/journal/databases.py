@@ -14,9 +14,10 @@ from action_assistant.journal.migrate import recognize, upgrade_to
 T = TypeVar("T")
 
 
-def database_of(url: str) -> Database:
-    """Return the PostgreSQL or SQLite database that a URL names, without connecting to it. Raise
-    CannotStart for a malformed URL or a database that is neither."""
+def database_of(url: str, *, several: bool = False) -> Database:
+    """Return the PostgreSQL or SQLite database that a URL names, without connecting to it. `several`:
+    other processes may write to it, too. Raise CannotStart for a malformed URL, a database that is
+    neither, or a file for several."""
     try:
         parsed = make_url(url)
     except ArgumentError as error:
@@ -25,7 +26,9 @@ def database_of(url: str) -> Database:
     if parsed.drivername in {"postgresql", "postgres"} and parsed.database:
         from action_assistant.journal.postgres import Postgres
 
-        return Postgres(parsed)
+        return Postgres(parsed, several=several)
+    if several:
+        raise CannotStart("Several editors need a Postgres database: --database postgresql://…")
     if parsed.get_backend_name() == "sqlite" and parsed.database:
         from action_assistant.journal.sqlite import Sqlite
 

@@ -12,8 +12,8 @@ if TYPE_CHECKING:  # workers read events too, and need no database
 class Event(msgspec.Struct, frozen=True, gc=False):
     """A fact of the log. It is never changed and never deleted.
 
-    `seq` counts the events of a stream from 1 without gaps; `position` orders all streams of one
-    journal. `kind` is in the past tense with a version (`graph.updated.v1`). `at` is in
+    `seq` counts the events of a stream from 1 without gaps; `position` orders what one writer has
+    stored (`journal/slots.py`). `kind` is in the past tense with a version (`graph.updated.v1`). `at` is in
     microseconds since 1970, UTC: for people, never for ordering.
     """
 
@@ -41,11 +41,13 @@ class Draft(msgspec.Struct, frozen=True, gc=False):
 
 class Addition(msgspec.Struct, frozen=True):
     """Drafts for one stream. `expected`: the newest `seq` that the caller knows; None to append in
-    any case."""
+    any case. `epoch`: how often the stream had changed hands when the caller came to own it; None where
+    streams have no owners."""
 
     stream: str
     drafts: tuple[Draft, ...]
     expected: int | None = None
+    epoch: int | None = None
 
 
 def bare(events: Iterable[Event], usual: str) -> list[BareEvent]:

@@ -28,12 +28,19 @@ from action_assistant.journal.database import (
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.migrate import revisions_of
-from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
-from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
+from action_assistant.journal.reader import EVENTS, JournalReader, body_of, seal_of
+from action_assistant.journal.removal import (
+    STREAM,
+    StreamRemoved,
+    delete_some,
+    removed_by,
+    taken_out,
+)
+from action_assistant.journal.slots import LogOrder, before_first, pages_in_order, slot_of
 from action_assistant.journal.writer import Job, JobOutcomes, Transaction, Writer
 from action_assistant.kit.shared_check import SharedCheck
 from action_assistant.schema.branches import BRANCHES, VERSIONS
-from action_assistant.schema.editor_tables import editor_head, editor_snapshot
+from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
 
 log: Final = logging.getLogger(__name__)
@@ -129,10 +136,12 @@ class Journal(JournalReader):
         self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
 
     @staticmethod
-    def prepare(url: str, branch: Branch, *, copies: Path | None = None) -> None:
+    def prepare(
+        url: str, branch: Branch, *, copies: Path | None = None, several: bool = False
+    ) -> None:
         """Open the journal of a branch, bring its tables to this version, and close it again, so
         that errors appear before a server begins. Blocks. Raise CannotStart as `open` does."""
-        database = database_of(url)
+        database = database_of(url, several=several)
         try:
             database.open(branch, _before(copies)).close()
         finally:
@@ -148,14 +157,16 @@ class Journal(JournalReader):
         copies: Path | None = None,
         at_once: bool = False,
         upgrades: bool = True,
+        several: bool = False,
     ) -> "Journal":
         """Open the journal of a branch, and bring its tables to this version. `url`: sqlite:///PATH
         or postgresql://… `fold`: turns events into statements for the tables. `copies`: the folder
         for a copy before an upgrade; None makes no copy. `at_once`: the event loop may wait for a
         local disk while that is quick; not for a process that must always answer. Without `upgrades`
-        the tables stay as they are, and only the log may be read. Raise CannotStart if the database is another program's, newer, in use, not reached, not writable, or does not
-        store commits durably."""
-        database = database_of(url)
+        the tables stay as they are, and only the log may be read. `several`: other processes that say the
+        same write to this Postgres, too; each has a slot. Raise CannotStart if the database is another
+        program's, newer, in use, not reached, not writable, or does not store commits durably."""
+        database = database_of(url, several=several)
         return await cls.on(
             database, branch=branch, fold=fold, copies=copies, at_once=at_once, upgrades=upgrades
         )
@@ -284,13 +295,13 @@ class Journal(JournalReader):
         def again(transaction: Transaction) -> int:
             for table in reversed(folds):
                 transaction.connection.execute(table.delete())
-            done = position = 0
-            while rows := transaction.connection.execute(following(position, _PAGE)).all():
+            done = 0
+            position = editor_event.c.position
+            for rows in pages_in_order(transaction.connection, EVENTS, position, _PAGE, removed_by):
                 for row in rows:
                     for statement in transaction.fold(Event(*row)):
                         transaction.connection.execute(statement)
                 done += len(rows)
-                position = rows[-1].position
             return done
 
         return await self._write(again)
@@ -300,15 +311,16 @@ class Journal(JournalReader):
         every missing event is found. `tell` is called with the number of events read so far. If the
         journal cannot be read, that is the last damage of the list."""
         inspector = Inspector(taken_out)
-        after = 0
         try:
-            while True:
-                rows, after = await self._ask(partial(self._database.scan, after=after))
-                for row in rows:
+            slots = await self._ask(self._database.slots)
+            order = LogOrder(slots, removed_by)
+            after = {slot: before_first(slot) for slot in slots}
+            while (slot := order.needed) is not None:
+                rows, after[slot] = await self._ask(partial(self._database.scan, after=after[slot]))
+                order.add(slot, rows if len(slots) == 1 else _in_slot(slot, rows))
+                for row in order.take():
                     inspector.see(row)
                 tell(inspector.seen)
-                if not rows:
-                    break
             ends = await self.query(select(_head.stream, _head.seq, _head.chain))
             found = inspector.findings(tuple(row) for row in ends)
             complaints = await self._ask(self._database.complaints)
@@ -328,6 +340,11 @@ class Journal(JournalReader):
         """Return the health of the parts `database`, `writer` (its thread) and `schema`: None for a
         part that works, else the reason. The check tries to write, and answers within seconds."""
         return await self._probe.parts()
+
+    @property
+    def slot(self) -> int | None:
+        """Return the slot in which this process stores events; None while it has no connection."""
+        return self._writer.slot
 
     @property
     def metrics(self) -> CommitMetrics:
@@ -450,6 +467,11 @@ class Journal(JournalReader):
                 if each.position > last:
                     last = each.position
                     yield each
+
+
+def _in_slot(slot: int, rows: Sequence[Sequence[Any]]) -> list[Sequence[Any]]:
+    """Return those of some stored events (`rows`: their columns) that are in a slot."""
+    return [row for row in rows if slot_of(row[6]) == slot]
 
 
 class JournalProbe:

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
-from sqlalchemy import URL, Connection, NullPool, func, select
+from sqlalchemy import URL, Connection, NullPool, func, make_url, select
 from sqlalchemy.event import listens_for
 from sqlalchemy.exc import DBAPIError, DisconnectionError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
@@ -30,6 +30,7 @@ from action_assistant.journal.failover import (
     hosts_of,
 )
 from action_assistant.journal.migrate import kept_as_it_is, upgrade_to
+from action_assistant.journal.slots import SLOTS, ends_of_slots, slot_of
 from action_assistant.schema.editor_tables import editor_event
 
 T = TypeVar("T")
@@ -51,21 +52,22 @@ _SETTINGS: Final = {
     "server_encoding": ({"UTF8"}, "it cannot hold every text"),
     _READ_ONLY: ({"off"}, "it is a read-only copy"),
 }
-#: One statement that inserts events if each of their streams still ends where the writer read its end, and
-#: moves those ends. If one does not, the column `position`, which is never null, would become null: the
-#: server refuses the whole statement, and nothing is written (decision 150).
-_STORE: Final = """
+#: One statement that inserts events if each of their streams still ends where the writer read its end, in
+#: the same epoch where it has one, and moves those ends. If one does not, the column `position`, which is
+#: never null, would become null: the server refuses the whole statement, and nothing is written (decision
+#: 150). In a shared database it locks the ends in one order, so that writers do not deadlock.
+_STORE_TEXT: Final = """
 WITH known AS (
-    SELECT * FROM unnest($9::text[], $10::bigint[], $11::bytea[], $12::bigint[], $13::bytea[])
-        AS k (stream, seq, chain, old_seq, old_chain)
-), begun AS (
+    SELECT * FROM unnest($9::text[], $10::bigint[], $11::bytea[], $12::bigint[], $13::bytea[]{epochs})
+        AS k (stream, seq, chain, old_seq, old_chain{epoch})
+), {held}begun AS (
     INSERT INTO head (stream, seq, chain)
     SELECT stream, seq, chain FROM known WHERE old_seq = 0 ORDER BY stream
     ON CONFLICT (stream) DO NOTHING
     RETURNING stream
 ), moved AS (
-    UPDATE head SET seq = k.seq, chain = k.chain FROM known k
-    WHERE head.stream = k.stream AND (head.seq, head.chain) = (k.old_seq, k.old_chain)
+    UPDATE head SET seq = k.seq, chain = k.chain FROM {ends}
+    WHERE head.stream = k.stream AND (head.seq, head.chain) = (k.old_seq, k.old_chain){is_same}
     RETURNING head.stream
 )
 INSERT INTO event (stream, seq, kind, author, at, body, position, chain)
@@ -77,6 +79,15 @@ FROM unnest($1::text[], $2::bigint[], $3::text[], $4::text[], $5::bigint[],
             $6::bytea[], $7::bigint[], $8::bytea[])
     AS e (stream, seq, kind, author, at, body, position, chain)
 """
+_HOLD: Final = "SELECT stream FROM head WHERE stream = ANY({0}) ORDER BY stream FOR UPDATE"
+_STORE: Final = _STORE_TEXT.format(epochs="", epoch="", held="", ends="known k", is_same="")
+_STORE_SHARED: Final = _STORE_TEXT.format(
+    epochs=", $15::bigint[]",
+    epoch=", epoch",
+    held=f"held AS ({_HOLD.format('$9::text[]')}), ",
+    ends="held JOIN known k USING (stream)",
+    is_same=" AND head.epoch = k.epoch",
+)
 #: A commit that waits for the replica: once it is confirmed, the replica has all that came before, also a
 #: commit whose wait ended with its connection, and that would be lost in a failover (decision 168).
 _BARRIER: Final = "SELECT pg_logical_emit_message(true, 'action-assistant', '')"
@@ -86,10 +97,29 @@ _PRIMARY: Final = (
 )
 #: Commits that a failover keeps: they wait for the replica's disk.
 _KEPT: Final = frozenset({"on", "remote_apply"})
+#: Connections of an earlier session of this process that the server has not ended yet.
+_OLD: Final = (
+    "SELECT count(*) FROM pg_stat_activity WHERE application_name = $1 AND pid <> pg_backend_pid()"
+)
+#: The first number of the locks of slots; the second one is the slot.
+SLOT_LOCKS: Final = (
+    int.from_bytes(hashlib.sha256(b"action-assistant slots").digest()[:4], "big") >> 1
+)
+#: Locks of slots that are held now.
+_HELD: Final = (
+    "FROM pg_locks WHERE locktype = 'advisory' AND granted AND objsubid = 2"
+    f" AND classid = {SLOT_LOCKS}"
+    " AND database = (SELECT oid FROM pg_database WHERE datname = current_database())"
+)
+_EDITORS: Final = f"SELECT count(*) {_HELD}"
+#: The condition that a session holds a slot, to be formatted with the slot.
+HELD_SLOT: Final = f"EXISTS (SELECT 1 {_HELD} AND objid = ({{}})::oid)"
 _END_OLD: Final = """
 SELECT pg_terminate_backend(pid) FROM pg_stat_activity
 WHERE application_name = $1 AND pid <> pg_backend_pid()
 """
+#: SQLSTATE of a deadlock, and of a transaction that others have overtaken.
+_RACES: Final = ("40P01", "40001")
 #: SQLSTATE classes that speak of the server: connection, resources, operator, system, internal.
 _SERVER: Final = ("08", "53", "57", "58", "XX", "25", "F0")
 
@@ -100,8 +130,14 @@ class PostgresSession:
     connection: Connection
 
     def __init__(
-        self, engine: AsyncEngine, begin: Callable[[Any], Awaitable[Watch | None]]
+        self,
+        engine: AsyncEngine,
+        begin: Callable[[Any], Awaitable[Watch | None]],
+        *,
+        is_shared: bool = False,
     ) -> None:
+        self.is_shared: Final = is_shared
+        self.slot = 0
         self._engine = engine
         self._watch: Watch | None = None
         self._warned = ""
@@ -151,20 +187,27 @@ class PostgresSession:
         if self._watch is not None and (doubt := self._warned or self._watch.doubt):
             raise Unfit(doubt)
 
-    def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
+    def store(
+        self,
+        events: Sequence[tuple[Event, bytes]],
+        known: Mapping[str, Head],
+        epochs: Mapping[str, int],
+    ) -> None:
         """Write events, each with its link of the hash chain, and the new end of each stream (the
         number and link of its last event). If no transaction is open, this is one of its own. Raise
-        Overtaken if a stream does not end where `known` says, or a position is taken."""
+        Overtaken if a stream does not end where `known` says, has another epoch in a shared database,
+        or a position is taken."""
         columns = [(e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position) for e, _ in events]
         values = [list(column) for column in zip(*columns, strict=True)]
         heads = {event.stream: Head(event.seq, chain) for event, chain in events}
         old = [known[stream] for stream in heads]
         ends = [[end.seq for end in ends] for ends in (heads.values(), old)]
         links = [[end.chain for end in ends] for ends in (heads.values(), old)]
+        shared = ([epochs[stream] for stream in heads],) if self.is_shared else ()
         try:
             await_only(
                 self._raw.execute(
-                    _STORE,
+                    _STORE_SHARED if self.is_shared else _STORE,
                     *values,
                     [chain for _, chain in events],
                     list(heads),
@@ -173,11 +216,23 @@ class PostgresSession:
                     ends[1],
                     links[1],
                     len(heads),
+                    *shared,
                 )
             )
-        except (asyncpg.NotNullViolationError, asyncpg.UniqueViolationError) as error:
+        except asyncpg.UniqueViolationError as error:
+            raise Overtaken(heads, by_position=True) from error
+        except (asyncpg.NotNullViolationError, asyncpg.DeadlockDetectedError) as error:
             raise Overtaken(heads) from error
         self._check()
+
+    def hold(self, streams: Sequence[str]) -> None:
+        """Lock the ends of these streams until the end of the transaction, in the order of `store`."""
+        await_only(self._raw.execute(_HOLD.format("$1::text[]"), list(streams)))
+
+    def abandon(self) -> None:
+        """Roll the open transaction back, if there is one."""
+        if self._raw.is_in_transaction():
+            self.say("ROLLBACK")
 
     def close(self) -> None:
         """Close the connection at once; an uncommitted transaction is rolled back."""
@@ -202,7 +257,8 @@ class PostgresSession:
 
 
 class Postgres:
-    """A Postgres database in which this process is the only writer."""
+    """A Postgres database in which this process is the only writer, or with `several` one of several:
+    then it has the first slot that is free, and keeps out whoever wants to be the only one."""
 
     is_local: Final = False
     patience: Final = 10.0
@@ -214,7 +270,9 @@ class Postgres:
         OSError,
     )
 
-    def __init__(self, url: URL) -> None:
+    def __init__(self, url: URL, *, several: bool = False) -> None:
+        self._several = several
+        self._slot = 0
         self._failover, self._url = failover_of(url)
         self.name: Final = f"The database {_named(url)}"
         self.address: Final = url.set(drivername="postgresql").render_as_string(hide_password=False)
@@ -249,6 +307,8 @@ class Postgres:
         tables of the branch to this version, and connect. `before` is called if tables are about to
         change; without `upgrades` they stay as they are."""
         session = self.own(branch)
+        if self._several:
+            before = _alone(before)
         try:
             self.migrate(upgrade_to(branch, before=before) if upgrades else kept_as_it_is(branch))
         except BaseException:
@@ -297,7 +357,10 @@ class Postgres:
             server["synchronous_commit"] = (
                 "on"  # whatever the server is told while we are connected
             )
-        return PostgresSession(self._engine(server, poolclass=NullPool), self._take_over)
+        engine = self._engine(server, poolclass=NullPool)
+        session = PostgresSession(engine, self._take_over, is_shared=self._several)
+        session.slot = self._slot
+        return session
 
     async def _take_over(self, raw: Any) -> Watch | None:
         for name, (allowed, why) in _SETTINGS.items():
@@ -306,16 +369,35 @@ class Postgres:
                 raise Unfit(f"{why} ({name} is {value})")
         primary = await self._checked_primary(raw)
         await raw.execute(_END_OLD, self._me)
-        until = time.monotonic() + _HANDOVER
-        while not await raw.fetchval("SELECT pg_try_advisory_lock($1)", self._key):
-            if time.monotonic() > until:
-                raise Unfit("it is in use by another process")
-            await asyncio.sleep(0.05)
+        if self._several:
+            await self._take_slot(raw)
+        else:
+            await _until(
+                lambda: raw.fetchval("SELECT pg_try_advisory_lock($1)", self._key),
+                "it is in use by another process",
+            )
         if self._failover is None or primary is None:
             return None
         await raw.execute(_BARRIER)
         self._connects += 1  # readers follow
         return Watch(self._failover, primary)
+
+    async def _take_slot(self, raw: Any) -> None:
+        """Lock the slot that this process had, or the first that is free, once its last session has ended
+        on the server. Raise Unfit if there is none, or a process is the only writer."""
+        await _until(
+            lambda: raw.fetchval("SELECT pg_try_advisory_lock_shared($1)", self._key),
+            "it is in use by a process that shares it with no other",
+        )
+        await _until(
+            lambda: raw.fetchval(f"SELECT ({_OLD}) = 0", self._me),
+            "it has not ended an earlier connection of this process",
+        )
+        for slot in (self._slot, *range(SLOTS)):
+            if await raw.fetchval("SELECT pg_try_advisory_lock($1, $2)", SLOT_LOCKS, slot):
+                self._slot = slot
+                return
+        raise Unfit(f"{SLOTS} editors use it already")
 
     async def _checked_primary(self, raw: Any) -> Primary | None:
         """Return what the server says of itself, None where no other takes over from it. Raise Unfit if
@@ -341,6 +423,11 @@ class Postgres:
         state = getattr(cause, "sqlstate", None) or getattr(cause, "pgcode", None)
         return state is None or str(state).startswith(_SERVER)
 
+    def raced(self, error: Exception) -> bool:
+        """Return whether others, in a shared database, wrote at the same time."""
+        cause: Any = error.orig if isinstance(error, DBAPIError) else error
+        return self._several and getattr(cause, "sqlstate", None) in _RACES
+
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Call `question` with a connection that is not the writer's, and return its result."""
         async with self._readers.connect() as connection:
@@ -353,6 +440,10 @@ class Postgres:
                 isolation_level="REPEATABLE READ", postgresql_readonly=True
             )
             return await connection.run_sync(question)
+
+    def slots(self, connection: Connection) -> list[int]:
+        """Return the slots in which there are events."""
+        return [slot_of(end) for end in ends_of_slots(connection, editor_event.c.position)]
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Return a page of stored events after the position `after`, with their links of the hash
@@ -395,6 +486,17 @@ class Postgres:
         return self.name[0].lower() + self.name[1:]
 
 
+def beside(url: str, name: str, *, size: int, patience: float) -> AsyncEngine:
+    """Return an engine for connections beside those of a journal, with transactions of their own. `size`:
+    how many at most; `patience`: seconds for a statement, and for a connection to come up."""
+    failover, parsed = failover_of(make_url(url))
+    server = {"application_name": f"action-assistant {os.getpid()} {name}"}
+    if failover is not None:
+        server["synchronous_commit"] = "on"
+    arguments = {"timeout": patience, "command_timeout": patience, "server_settings": server}
+    return engine_of(parsed, arguments, pool_size=size, max_overflow=0, pool_pre_ping=True)
+
+
 def weakness(connection: Connection, failover: Failover | None) -> str:
     """Return a sentence about the first setting that forbids writing to a database (an event could be
     lost, or the server is a read-only copy); "" if all settings are right. It only reads. `connection`
@@ -422,6 +524,29 @@ def _named(url: URL) -> str:
     if len(hosts) < 2:
         return str(URL.create("postgresql", host=url.host, port=url.port, database=url.database))
     return f"postgresql://{','.join(hosts)}/{url.database}"
+
+
+async def _until(ask: Callable[[], Awaitable[bool]], why_not: str) -> None:
+    """Ask until the answer is yes. Raise Unfit with the reason `why_not` after some seconds."""
+    until = time.monotonic() + _HANDOVER
+    while not await ask():
+        if time.monotonic() > until:
+            raise Unfit(why_not)
+        await asyncio.sleep(0.05)
+
+
+def _alone(before: Before) -> Before:
+    """Return a function that is called before tables change, and refuses that while other editors use
+    them; else it calls `before`."""
+
+    def check(connection: Connection, branch: Branch, revision: str) -> None:
+        if connection.exec_driver_sql(_EDITORS).scalar_one() > 1:
+            raise CannotStart(
+                "This version has to change the tables, but other editors use them: end those first."
+            )
+        before(connection, branch, revision)
+
+    return check
 
 
 async def _hear() -> None:

@@ -33,7 +33,8 @@ _PAGE: Final = 500  # events that are read at once
 
 # The tables of the log are the same for both branches.
 _event, _head, _snapshot = editor_event.c, editor_head.c, editor_snapshot.c
-_EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
+#: A query for all stored events.
+EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
 _STREAM: Final[BindParameter[str]] = bindparam("stream")
 _NEWEST: Final = select(_head.seq).where(_head.stream == _STREAM)
 _BODY: Final = select(_event.body).where(_event.stream == _STREAM, _event.seq == bindparam("seq"))
@@ -67,7 +68,7 @@ class JournalReader:
     ) -> list[Event]:
         """Return the events of a stream with `after < seq <= upto`, in order. `limit`: at most so
         many, the oldest ones."""
-        chosen = _EVENTS.where(_event.stream == stream, _event.seq > after)
+        chosen = EVENTS.where(_event.stream == stream, _event.seq > after)
         if upto is not None:
             chosen = chosen.where(_event.seq <= upto)
         return await self._events(chosen.order_by(_event.seq).limit(limit))
@@ -162,7 +163,7 @@ def _plain(result: CursorResult[Any]) -> list[Sequence[Any]]:
 
 def following(position: int, limit: int) -> Select[Any]:
     """Return a query for the first `limit` events of all streams after a position, in order."""
-    return _EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
+    return EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
 
 
 def body_of(connection: Connection, stream: str, seq: int) -> bytes:

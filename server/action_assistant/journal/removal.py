@@ -5,7 +5,8 @@ The log says so before the first event goes, with the end of the stream and the 
 go from the newest to the oldest: what is left at any time is a sound beginning.
 """
 
-from typing import ClassVar, Final
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final
 
 import msgspec
 from sqlalchemy import Connection, delete, func, select
@@ -48,6 +49,13 @@ def taken_out(event: Event) -> tuple[str, Head] | None:
         return None
     removed = msgspec.json.decode(event.body, type=StreamRemoved)
     return removed.stream, removed.end
+
+
+def removed_by(row: Sequence[Any]) -> tuple[str, int] | None:
+    """Return the name of the stream that a stored event removes from the log, and its last seq; None for
+    another event. `row`: its columns in the database."""
+    found = taken_out(Event(*row[:7])) if row[0] == STREAM else None
+    return None if found is None else (found[0], found[1].seq)
 
 
 def delete_some(connection: Connection, stream: str, by: int) -> bool:

@@ -67,7 +67,10 @@ _SCAN: Final = (
 
 
 class SqliteSession:
-    """The connection that writes to a SQLite file."""
+    """The connection that writes to a SQLite file. The lock of the file keeps other writers out."""
+
+    slot: Final = 0
+    is_shared: Final = False
 
     def __init__(self, path: Path, driver: Any) -> None:
         self._checkpoints = Checkpoints(path, driver)
@@ -112,11 +115,16 @@ class SqliteSession:
         if command == "COMMIT":
             self._checkpoints.committed()
 
-    def store(self, events: Sequence[tuple[Event, bytes]], known: Mapping[str, Head]) -> None:
+    def store(
+        self,
+        events: Sequence[tuple[Event, bytes]],
+        known: Mapping[str, Head],
+        epochs: Mapping[str, int],
+    ) -> None:
         """Write events, each with its link of the hash chain. In the same transaction a trigger
-        writes the new ends of their streams. The lock of the file keeps other writers out, so
-        `known`, the ends as this process read them, is right."""
-        del known
+        writes the new ends of their streams. There is no other writer, so `known`, the ends as this
+        process read them, is right."""
+        del known, epochs
         rows = [
             (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
             for e, link in events
@@ -131,6 +139,14 @@ class SqliteSession:
             self._raw.execute("COMMIT")
         if not self._raw.in_transaction:
             self._checkpoints.committed()
+
+    def hold(self, streams: Sequence[str]) -> None:
+        """Do nothing: no other process can move a stream."""
+
+    def abandon(self) -> None:
+        """Roll the open transaction back, if there is one."""
+        if self._raw.in_transaction:
+            self._raw.execute("ROLLBACK")
 
     def close(self) -> None:
         """Close the connection; an uncommitted transaction is rolled back."""
@@ -311,6 +327,11 @@ class Sqlite:
             IntegrityError | ProgrammingError | InterfaceError | DataError | UnicodeDecodeError,
         )
 
+    def raced(self, error: Exception) -> bool:
+        """Return False: nobody else writes."""
+        del error
+        return False
+
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Call `question` with a connection, on a thread that reads, and return its result."""
 
@@ -331,6 +352,12 @@ class Sqlite:
                 connection.exec_driver_sql("ROLLBACK")
 
         return await self.ask(asked)
+
+    def slots(self, connection: Connection) -> list[int]:
+        """Return one slot: the rows of a file stand in the order of the log, also in a copy of a log of
+        several writers."""
+        del connection
+        return [0]
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Return a page of stored events after the position `after`, even if their text is damaged,

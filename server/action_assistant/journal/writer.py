@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any, Final, Generic, TypeAlias, TypeVar
 
-from sqlalchemy import Connection, Select, func, select
+from sqlalchemy import Connection, Select, select
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
@@ -16,6 +16,7 @@ from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.commit_metrics import CommitMetrics
 from action_assistant.journal.database import Database, Overtaken, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
+from action_assistant.journal.slots import newest_in
 from action_assistant.kit.clock import utc_us
 from action_assistant.schema import editor_tables
 
@@ -31,7 +32,7 @@ _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job jo
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
 _AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
 _RUNS: Final = 5  # of the same jobs, where another process goes on writing to their streams
-_LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.position), 0))
+_head: Final = editor_tables.editor_head.c
 
 
 class Job(Generic[T]):
@@ -65,9 +66,11 @@ class Transaction:
     def __init__(self, session: WriterSession, fold: Fold) -> None:
         self.fold: Final = fold
         self._session = session
-        self._position: int = session.connection.execute(_LAST).scalar_one()
+        last = newest_in(editor_tables.editor_event.c.position, session.slot)
+        self._position: int = session.connection.execute(last).scalar_one()
         self._heads: dict[str, Head] = {}
         self._stored: dict[str, Head] = {}  # ends of the same streams in the database
+        self._epochs: dict[str, int] = {}  # of the same streams, where the database is shared
         self._before: dict[str, Head] = {}  # ends of streams before the job that is under way
         self._gathered: list[tuple[Event, bytes]] = []  # by earlier jobs
         self._own: list[tuple[Event, bytes]] = []  # by this job
@@ -85,6 +88,14 @@ class Transaction:
         if len(self._heads) > _KNOWN:
             self._heads.clear()
             self._stored.clear()
+            self._epochs.clear()
+
+    def hold(self, streams: Sequence[str]) -> None:
+        """Let no other process move these streams until the end of this transaction, so that it cannot be
+        overtaken by them again. Call it before the first job."""
+        self._session.begin()
+        self._begun = True
+        self._session.hold(streams)
 
     @property
     def connection(self) -> Connection:
@@ -107,6 +118,8 @@ class Transaction:
         head = self._head(stream)
         if addition.expected is not None and addition.expected != head.seq:
             raise Conflict(f"{stream} has gone on to {head.seq}; {addition.expected} was expected.")
+        if addition.epoch is not None and addition.epoch != self._epochs.get(stream):
+            raise Conflict(f"Another process owns {stream} now.")
         at, seq, chain = utc_us(), head.seq, head.chain
         for draft in addition.drafts:
             seq += 1
@@ -139,8 +152,11 @@ class Transaction:
         except Overtaken:
             raise
         except Exception as error:  # of the job alone: its caller gets it
-            if isinstance(error, database.faults) and (self._storing or database.lost(error)):
-                raise
+            if isinstance(error, database.faults):
+                if database.raced(error):
+                    raise Overtaken(()) from error
+                if self._storing or database.lost(error):
+                    raise
             self._own.clear()
             self._position = position
             self._heads |= self._before
@@ -185,7 +201,7 @@ class Transaction:
         if events:
             self._storing = True
             self.last = events[-1]
-            self._session.store(events, self._stored)
+            self._session.store(events, self._stored, self._epochs)
             self._storing = False
             for event, chain in events:
                 self._stored[event.stream] = Head(event.seq, chain)
@@ -193,11 +209,14 @@ class Transaction:
     def _head(self, stream: str) -> Head:
         head = self._heads.get(stream)
         if head is None:
-            table = editor_tables.editor_head
-            found = select(table.c.seq, table.c.chain).where(table.c.stream == stream)
+            shared = self._session.is_shared
+            columns = (_head.seq, _head.chain, *((_head.epoch,) if shared else ()))
+            found = select(*columns).where(_head.stream == stream)
             row = self._session.connection.execute(found).first()
-            head = self._heads[stream] = Head(*row) if row is not None else NOTHING
+            head = self._heads[stream] = Head(*row[:2]) if row is not None else NOTHING
             self._stored[stream] = head
+            if shared:
+                self._epochs[stream] = row[2] if row is not None else 0
         return head
 
 
@@ -248,6 +267,12 @@ class Writer:
         )
 
     @property
+    def slot(self) -> int | None:
+        """Return the slot in which events are stored; None while there is no connection."""
+        session = self._session
+        return None if session is None else session.slot
+
+    @property
     def is_alive(self) -> bool:
         """Return whether the writer's thread still runs."""
         return self._thread.is_alive()
@@ -283,19 +308,19 @@ class Writer:
     def _commit(self, jobs: Sequence[Job[Any]]) -> JobOutcomes:
         done: list[Outcome] = []
         transaction: Transaction | None = None
+        held: Sequence[str] = ()  # streams by which another process has overtaken this one
         self.metrics.begins()
         try:
             for run in range(_RUNS):
                 session, transaction = self._connected()
                 try:
-                    session.run(partial(self._together, transaction, jobs, done))
+                    session.run(partial(self._together, transaction, jobs, done, held))
                     break
                 except Overtaken as error:
-                    # Whoever has the lock is the writer: take it again, and read all ends again. A
-                    # job that was made for another end is refused then, alone.
-                    log.error("%s: %s (%s).", self._database.name, error, error.streams[0])
-                    self._disconnect()
+                    # Read all ends again. A job that was made for another end is refused then, alone.
                     transaction = None  # the server refused it whole
+                    held = error.streams
+                    self._forget_ends(session, error)
                     if run == _RUNS - 1:
                         raise
                     done.clear()
@@ -313,10 +338,27 @@ class Writer:
             self.metrics.over(len(jobs), [events for _, failed, events in done if failed is None])
         return list(zip(jobs, done, strict=True))
 
+    def _forget_ends(self, session: WriterSession, error: Overtaken) -> None:
+        """Forget what is known of the ends of streams, since this process was overtaken. Where it should
+        be the only writer, or another one stores in its slot, take the lock again: who has it is the
+        writer."""
+        if session.is_shared and not error.by_position:
+            self._transaction = None
+            session.run(session.abandon)
+            return
+        log.error("%s: %s (%s).", self._database.name, error, ", ".join(error.streams[:1]))
+        self._disconnect()
+
     def _together(
-        self, transaction: Transaction, jobs: Sequence[Job[Any]], done: list[Outcome]
+        self,
+        transaction: Transaction,
+        jobs: Sequence[Job[Any]],
+        done: list[Outcome],
+        held: Sequence[str],
     ) -> None:
         transaction.start()
+        if held:
+            transaction.hold(held)
         done.extend(transaction.attempt(job, self._database) for job in jobs)
         transaction.finish()
 

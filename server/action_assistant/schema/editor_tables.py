@@ -8,6 +8,8 @@ from action_assistant.schema.log_tables import NAMES, log_tables, outbox_tables,
 
 EDITOR: Final = MetaData(naming_convention=NAMES)
 editor_event, editor_head, editor_snapshot = log_tables(EDITOR)
+#: How often a stream has changed hands between several editors.
+editor_head.append_column(Column("epoch", BigInteger, nullable=False, server_default="0"))
 written_by: Final = written_by_table(EDITOR)
 #: A graph of the catalogue, or an action of the library (`kind`). `name` and `description` follow the
 #: document. A draft was made of the graph `draft_of` after its change `drafted_seq`; what both are compared
@@ -240,3 +242,27 @@ mention_read: Final = Table(
     Column("key", Text, primary_key=True),
 )
 outbox, receiver = outbox_tables(EDITOR)
+#: One of several editors that share this database, with the slot in which it writes. `life`: a random number of
+#: its process. `url`: where it takes requests of other editors. `beat_at`: when it last said that it lives
+#: (µs UTC, by the clock of the database); `draining_at`: since when it gives its rooms up.
+editor: Final = Table(
+    "editor",
+    EDITOR,
+    Column("slot", BigInteger, primary_key=True, autoincrement=False),
+    Column("life", LargeBinary, nullable=False),
+    Column("url", Text, nullable=False),
+    Column("version", Text, nullable=False),
+    Column("beat_at", BigInteger, nullable=False),
+    Column("draining_at", BigInteger),
+)
+#: The editor that owns a stream, by its life, since it took the stream with this epoch. It only shows where to
+#: ask; `head.epoch` says who may append.
+room: Final = Table(
+    "room",
+    EDITOR,
+    Column("stream", Text, primary_key=True),
+    Column("life", LargeBinary, nullable=False),
+    Column("epoch", BigInteger, nullable=False),
+    Column("since", BigInteger, nullable=False),
+    Index(None, "life"),
+)

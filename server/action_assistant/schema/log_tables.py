@@ -109,4 +109,6 @@ def outbox_tables(metadata: MetaData) -> tuple[Table, Table]:
 
 
 #: The tables that are no folds. A message that was sent must not be sent again from its event.
-LOG: Final = frozenset({"event", "head", "snapshot", "written_by", "outbox", "receiver"})
+LOG: Final = frozenset(
+    {"event", "head", "snapshot", "written_by", "outbox", "receiver", "editor", "room"}
+)

@@ -13,9 +13,10 @@ import msgspec
 
 class Here(msgspec.Struct, frozen=True, gc=False):
     """This editor owns the stream. `epoch`: how often the stream had changed hands then; appends to it
-    name this number, and are refused once another editor has taken the stream."""
+    name this number, and are refused once another editor has taken the stream. None where streams have no
+    other owners."""
 
-    epoch: int
+    epoch: int | None
 
 
 class Elsewhere(msgspec.Struct, frozen=True, gc=False):
@@ -43,6 +44,10 @@ class Owners(Protocol):
         was closed; a stream that is owned elsewhere stays there. Never raise: if the database does not
         answer, the stream is taken from this editor when it has ended."""
 
+    def check_again(self, stream: str) -> None:
+        """Forget what is known of the owner of a stream, since its room has ended: the next `owner` asks the
+        database."""
+
     @property
     def draining(self) -> bool:
         """Return whether this editor gives its rooms up and takes no others, because it ends."""
@@ -66,8 +71,11 @@ class Alone:
     async def give_up(self, stream: str) -> None:
         """Do nothing: there is nobody else."""
 
+    def check_again(self, stream: str) -> None:
+        """Do nothing: the owner is always this editor."""
+
     def when_lost(self, hear: Callable[[str], object]) -> None:
         """Do nothing: no stream is ever lost."""
 
 
-_ALWAYS: Final = Here(0)
+_ALWAYS: Final = Here(None)

@@ -168,7 +168,7 @@ class Rooms:
         outlive_connection()  # others may wait for it, even if the first caller has left
         try:
             match await self._owners.owner(stream):
-                case Here():
+                case Here(epoch):
                     pass
                 case Elsewhere():
                     raise Unavailable(_ELSEWHERE)
@@ -183,6 +183,7 @@ class Rooms:
                 self._run_in_worker,
                 self._tried,
                 self.metrics,
+                epoch,
             )
             self.metrics.opened += 1
             if stream not in self._holders:  # the socket had left before it was loaded
@@ -205,6 +206,7 @@ class Rooms:
             room.end()
 
     def _forget(self, room: Room) -> None:
+        self._owners.check_again(room.stream)
         if self._rooms.get(room.stream) is room:
             del self._rooms[room.stream]
             self.metrics.unloaded += 1

@@ -251,7 +251,8 @@ def _answer_read(request: ReadRequest, replica: Replica, seq: int) -> None:
 class Room:
     """Holds the document of one graph in memory while it is in use, and applies, stores and
     broadcasts its edits. `on_end` is called when no member may join any more. `run_in_worker` runs
-    work that grows with the document, `tried` runs trials of large edits."""
+    work that grows with the document, `tried` runs trials of large edits. `epoch`: how often the stream had
+    changed hands when this editor took it, of several; an edit is refused once another one has it."""
 
     def __init__(
         self,
@@ -264,8 +265,10 @@ class Room:
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
         metrics: RoomMetrics | None = None,
+        epoch: int | None = None,
     ) -> None:
         self.stream: Final = stream
+        self._epoch = epoch
         self._graph: Final = graph_of(stream) or stream
         self._metrics = metrics or RoomMetrics()
         self.seq = loaded.seq
@@ -436,7 +439,7 @@ class Room:
             self._after_commit(outcome)
             return
         drafts = tuple([Draft(kind, edit.author, edit.update) for edit, kind in outcome.to_store])
-        addition = Addition(self.stream, drafts, self.seq)
+        addition = Addition(self.stream, drafts, self.seq, self._epoch)
         edits = [edit for edit, _ in outcome.to_store]
         also = self._sittings.begun(self._graph, edits, self.seq + 1)
         self._journal.append_then(addition, partial(self._stored, outcome), *also)

@@ -14,14 +14,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from sqlalchemy import Connection, MetaData, NullPool, Table, create_engine, insert, text
+from sqlalchemy import Connection, MetaData, NullPool, Table, create_engine, insert, select, text
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import last_writer, run_scripts
-from action_assistant.journal.removal import taken_out
+from action_assistant.journal.removal import removed_by, taken_out
+from action_assistant.journal.slots import pages_in_order
 from action_assistant.journal.sqlite import inspected
 from action_assistant.private_files import make_folder, sync
 from action_assistant.schema.branches import VERSIONS
@@ -210,13 +211,15 @@ def _copy_rows(
 
 
 def _rows_of(connection: Connection, table: Table) -> Iterator[list[dict[str, Any]]]:
-    """Yield the rows of a table in batches, events in the order of their positions. Its cursor is
-    closed before the tables change; the driver's own stays open until the end of the transaction.
-    """
+    """Yield the rows of a table in batches, events in their order. Its cursor is closed before the
+    tables change; the driver's own stays open until the end of the transaction."""
+    if table.name == "event":
+        chosen = select(*(table.c[name] for name in _COLUMNS))
+        for page in pages_in_order(connection, chosen, table.c.position, _ROWS, removed_by):
+            yield [row._asdict() for row in page]
+        return
     cursor = f"copied_{table.name}"
-    order = " ORDER BY position" if table.name == "event" else ""
-    command = f'DECLARE {cursor} CURSOR FOR SELECT * FROM "{table.name}"{order}'
-    connection.exec_driver_sql(command)
+    connection.exec_driver_sql(f'DECLARE {cursor} CURSOR FOR SELECT * FROM "{table.name}"')
     while rows := connection.exec_driver_sql(f"FETCH {_ROWS} FROM {cursor}").mappings().all():
         yield [dict(row) for row in rows]
     connection.exec_driver_sql(f"CLOSE {cursor}")

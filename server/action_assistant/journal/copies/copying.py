@@ -11,7 +11,8 @@ from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Branch, Database, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.migrate import recognize
-from action_assistant.journal.removal import taken_out
+from action_assistant.journal.removal import removed_by, taken_out
+from action_assistant.journal.slots import pages_in_order
 from action_assistant.schema import editor_tables
 from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
@@ -21,6 +22,8 @@ _AT_ONCE: Final = 64  # rows in memory: an event has up to a MiB, a snapshot sev
 
 # The tables of the log are the same for both branches, and in every version there was.
 _ROWS: Final = select(*(editor_event.c[name] for name in (*Event.__struct_fields__, "chain")))
+#: Without their epochs: in a copy no stream has an owner.
+_ENDS: Final = select(*(editor_head.c[name] for name in ("stream", "seq", "chain")))
 
 
 def copy(
@@ -95,8 +98,7 @@ def _copy(
             "what is copied goes into an empty one."
         )
     inspector = Inspector(taken_out)
-    streamed = here.execution_options(yield_per=_AT_ONCE)
-    for rows in streamed.execute(_ROWS.order_by(editor_event.c.position)).partitions():
+    for rows in pages_in_order(here, _ROWS, editor_event.c.position, _AT_ONCE, removed_by):
         for row in rows:
             inspector.see(tuple(row))
             if inspector.damage is not None:
@@ -106,12 +108,12 @@ def _copy(
             for statement in fold(Event(*row[:7])):
                 there.execute(statement)
         tell(inspector.seen)
-    ends = here.execute(select(editor_head)).all()
-    for damage in inspector.findings((row.stream, row.seq, row.chain) for row in ends):
+    for damage in inspector.findings(tuple(row) for row in here.execute(_ENDS)):
         raise _damaged(damage)
-    for table in (editor_head, editor_snapshot):
-        for rows in streamed.execute(select(table)).partitions():
-            _insert(there, table, rows)
+    streamed = here.execution_options(yield_per=_AT_ONCE)
+    for table, chosen in ((editor_head, _ENDS), (editor_snapshot, select(editor_snapshot))):
+        for some in streamed.execute(chosen).partitions():
+            _insert(there, table, some)
     return inspector.seen
 
 

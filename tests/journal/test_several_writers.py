@@ -1,0 +1,210 @@
+"""Several writers of one Postgres, each in a slot of its own: streams that all share go on whoever was first,
+streams with an owner are fenced by their epoch, and nothing is lost, doubled or damaged."""
+
+import asyncio
+import os
+import random
+from collections import Counter
+from collections.abc import Sequence
+
+import pytest
+from sqlalchemy import Executable
+from sqlalchemy.dialects.postgresql import insert
+
+from action_assistant.errors import CannotStart, Conflict, Unavailable
+from action_assistant.journal.events import Addition, Draft, Event, Fold, nothing
+from action_assistant.journal.journal import Journal
+from action_assistant.journal.slots import before_first, slot_of
+from action_assistant.schema import editor_tables
+from journal.servers import Server
+
+#: Events that each random writer appends.
+EVENTS = int(os.environ.get("SOAK_OVERTAKEN", "20"))
+_CUT = (
+    "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database()"
+    " AND pid <> pg_backend_pid() AND application_name NOT LIKE '%reads' ORDER BY random() LIMIT 1"
+)
+
+
+def draft(text: str = "x") -> Draft:
+    return Draft("thing.happened.v1", "ada", text.encode())
+
+
+async def opened(url: str, fold: Fold = nothing, *, several: bool = True) -> Journal:
+    return await Journal.open(url, branch="editor", fold=fold, several=several)
+
+
+async def everything(journal: Journal) -> list[Event]:
+    """Return all events in order of their positions."""
+    stored: list[Event] = []
+    while page := await journal.read_all(after=stored[-1].position if stored else 0):
+        stored += page
+    return stored
+
+
+async def test_each_writer_has_a_slot_and_the_only_writer_has_none_beside_it(
+    postgres: Server,
+) -> None:
+    url = postgres.new_database()
+    one, other = await opened(url), await opened(url)
+    assert [one.slot, other.slot] == [0, 1]
+    for n in range(3):
+        assert await one.append("people", [draft()]) == 2 * n + 1
+        assert await other.append("people", [draft()]) == 2 * n + 2
+    positions = [each.position for each in await one.read("people")]
+    begin = before_first(1)
+    assert positions == [1, begin + 1, 2, begin + 2, 3, begin + 3]
+    assert await one.verify() == []
+    with pytest.raises(CannotStart, match="in use by another process"):
+        await opened(url, several=False)
+    await one.close()
+    third = await opened(url)
+    assert third.slot == 0
+    assert await third.append("people", [draft()]) == 7
+    assert (await third.read("people"))[-1].position == 4
+    await third.close()
+    await other.close()
+    alone = await opened(url, several=False)
+    assert await alone.append("people", [draft()]) == 8
+    assert (await alone.read("people"))[-1].position == 5
+    assert await alone.verify() == []
+    with pytest.raises(CannotStart, match="shares it with no other"):
+        await opened(url)
+    await alone.close()
+
+
+async def test_a_file_has_one_writer(tmp_path: object) -> None:
+    with pytest.raises(CannotStart, match="Several editors need a Postgres database"):
+        await opened(f"sqlite:///{tmp_path}/editor.db")
+
+
+async def test_who_owns_a_stream_no_longer_cannot_append_to_it(postgres: Server) -> None:
+    url = postgres.new_database()
+    one, other = await opened(url), await opened(url)
+    await one.append_all([Addition("graph", (draft("1"),), 0, epoch=0)])
+    postgres.sql("UPDATE head SET epoch = 1 WHERE stream = 'graph'", url.rpartition("/")[2])
+    late = Addition("graph", (draft("late"),), 1, epoch=0)
+    fenced, shared = await asyncio.gather(
+        one.append_all([late]), one.append("people", [draft()]), return_exceptions=True
+    )
+    assert isinstance(fenced, Conflict)
+    assert shared == 1
+    assert await other.append_all([Addition("graph", (draft("2"),), 1, epoch=1)]) == [2]
+    with pytest.raises(Conflict):
+        await one.append_all([late])
+    assert [each.body for each in await one.read("graph")] == [b"1", b"2"]
+    assert await one.verify() == []
+    await one.close()
+    await other.close()
+
+
+def people(event: Event) -> Sequence[Executable]:
+    """Fold to the last author of each stream."""
+    row = {"id": event.stream, "name": event.body.decode(), "seen_at": event.seq}
+    made = insert(editor_tables.person).values(row)
+    return [made.on_conflict_do_update(index_elements=["id"], set_=row)]
+
+
+async def test_tables_are_rebuilt_alike_whoever_wrote_the_events(postgres: Server) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url, people) for _ in range(3)]
+    dice = random.Random(7)
+    for n in range(60):
+        await dice.choice(journals).append(f"s{dice.randrange(5)}", [draft(str(n))])
+    rows = "SELECT string_agg(id || name || seen_at, ' ' ORDER BY id) FROM person"
+    before = postgres.ask(rows, url.rpartition("/")[2])
+    assert await journals[2].rebuild() == 60
+    assert postgres.ask(rows, url.rpartition("/")[2]) == before
+    assert await journals[0].verify() == []
+    for each in journals:
+        await each.close()
+
+
+async def test_a_missing_event_of_any_slot_is_found(postgres: Server) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url) for _ in range(3)]
+    for n in range(12):
+        await journals[n % 3].append("people", [draft(str(n))])
+        await journals[n % 3].append(f"own/{n % 3}", [draft(str(n))])
+    name = url.rpartition("/")[2]
+    for slot in range(3):
+        lost = f"own/{slot}"
+        postgres.sql(f"CREATE TABLE kept AS SELECT * FROM event WHERE stream = '{lost}'", name)
+        postgres.sql(f"DELETE FROM event WHERE stream = '{lost}'", name)
+        postgres.sql(f"DELETE FROM head WHERE stream = '{lost}'", name)
+        (found,) = await journals[0].verify()
+        assert "missing" in found.why
+        postgres.sql("INSERT INTO event SELECT * FROM kept", name)
+        postgres.sql(
+            "INSERT INTO head SELECT stream, seq, chain FROM kept ORDER BY seq DESC LIMIT 1", name
+        )
+        postgres.sql("DROP TABLE kept", name)
+        assert await journals[0].verify() == []
+    for each in journals:
+        await each.close()
+
+
+class Racer:
+    """A writer that appends to several streams at once, half of the time only behind the end that it knows."""
+
+    def __init__(self, journal: Journal, name: str, seed: int) -> None:
+        self._journal = journal
+        self._name = name
+        self._dice = random.Random(seed)
+        self.acknowledged: list[tuple[str, int, bytes]] = []
+        self.refused: Counter[str] = Counter()
+
+    async def race(self) -> None:
+        for n in range(EVENTS):
+            body = f"{self._name}/{n}"
+            while not await self._tried(body):  # noqa: ASYNC110 - it waits for no event
+                await asyncio.sleep(self._dice.uniform(0, 0.02))
+
+    async def _tried(self, body: str) -> bool:
+        streams = self._dice.sample(range(4), self._dice.randint(1, 3))
+        expects = self._dice.random() < 0.3
+        additions = [
+            Addition(
+                f"s{n}", (draft(body),), await self._journal.newest(f"s{n}") if expects else None
+            )
+            for n in streams
+        ]
+        try:
+            seqs = await self._journal.append_all(additions)
+        except Conflict:
+            self.refused["conflict"] += 1
+            return False
+        except Unavailable as error:
+            self.refused["not known" if "not known" in error.detail else "unavailable"] += 1
+            return False
+        for addition, seq in zip(additions, seqs, strict=True):
+            self.acknowledged.append((addition.stream, seq, body.encode()))
+        return True
+
+
+@pytest.mark.parametrize("seed", range(int(os.environ.get("SOAK_SEEDS", "1"))))
+async def test_writers_of_shared_streams_whose_connections_are_cut_lose_nothing(
+    postgres: Server, seed: int
+) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url) for _ in range(3)]
+    racers = [Racer(each, f"w{n}", seed * 10 + n) for n, each in enumerate(journals)]
+    races = [asyncio.create_task(each.race()) for each in racers]
+    dice = random.Random(seed)
+    for _ in range(4):
+        await asyncio.sleep(dice.uniform(0.02, 0.2))
+        await asyncio.to_thread(postgres.sql, _CUT, url.rpartition("/")[2])
+    await asyncio.gather(*races)
+    stored = await everything(journals[0])
+    refused = sum((each.refused for each in racers), Counter())
+    assert refused["not known"] == 0
+    told = [each for racer in racers for each in racer.acknowledged]
+    assert Counter((each.stream, each.seq, each.body) for each in stored) == Counter(told)
+    slots = {slot_of(each.position) for each in stored}
+    for slot in slots:
+        mine = [each.position for each in stored if slot_of(each.position) == slot]
+        assert mine == [before_first(slot) + n for n in range(1, len(mine) + 1)]
+    assert len(slots) >= 3
+    assert await journals[0].verify() == []
+    for each in journals:
+        await each.close()
