@@ -1,0 +1,176 @@
+"""Several editors on one Postgres agree who owns a stream, whoever dies, freezes or is cut off."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+
+import pytest
+
+from action_assistant.editor.cluster.owners import Elsewhere, Here
+from action_assistant.editor.cluster.shared_owners import SharedOwners
+from action_assistant.errors import Conflict, Unavailable
+from action_assistant.journal.events import Addition, Draft, nothing
+from action_assistant.journal.journal import Journal
+from journal.servers import Server
+
+STREAM = "graph/g"
+
+
+class Editor:
+    """What of an editor owns streams: its journal and its owners."""
+
+    def __init__(self, name: str, journal: Journal, owners: SharedOwners) -> None:
+        self.url = f"http://{name}"
+        self.journal = journal
+        self.owners = owners
+        self.lost: list[str] = []
+        owners.when_lost(self.lost.append)
+
+    async def epoch(self, stream: str = STREAM) -> int:
+        """Own a stream, and return its epoch."""
+        match await self.owners.owner(stream):
+            case Here(epoch) if epoch is not None:
+                return epoch
+            case other:
+                raise AssertionError(other)
+
+    async def append(self, epoch: int, body: str) -> int:
+        """Append an event to the stream, as its owner in this epoch, behind the end that is stored."""
+        seq = await self.journal.newest(STREAM)
+        event = Draft("thing.happened.v1", "ada", body.encode())
+        (newest,) = await self.journal.append_all([Addition(STREAM, (event,), seq, epoch)])
+        return newest
+
+
+@asynccontextmanager
+async def editor(url: str, name: str) -> AsyncIterator[Editor]:
+    journal = await Journal.open(url, branch="editor", fold=nothing, several=True)
+    try:
+        async with SharedOwners.joined(journal, url, f"http://{name}") as owners:
+            yield Editor(name, journal, owners)
+    finally:
+        await journal.close()
+
+
+@pytest.fixture
+async def editors(postgres: Server) -> AsyncIterator[tuple[Editor, Editor]]:
+    """Two editors of one database."""
+    url = postgres.new_database()
+    async with AsyncExitStack() as stack:
+        one = await stack.enter_async_context(editor(url, "one"))
+        yield one, await stack.enter_async_context(editor(url, "two"))
+
+
+async def until(holds: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    async with asyncio.timeout(20):
+        while not holds():  # noqa: ASYNC110 - nothing tells it
+            await asyncio.sleep(0.02)
+
+
+async def test_who_comes_first_owns_a_stream_and_the_others_are_told_where_it_is(
+    editors: tuple[Editor, Editor],
+) -> None:
+    one, two = editors
+    assert await one.epoch() == 1
+    assert await two.owners.owner(STREAM) == Elsewhere("http://one", 0)
+    assert await two.epoch("graph/other") == 1
+    assert await one.owners.owner("graph/other") == Elsewhere("http://two", 1)
+    assert await one.append(1, "1") == 1
+    await one.owners.give_up(STREAM)
+    assert await two.epoch() == 2
+    with pytest.raises(Conflict):
+        await one.append(1, "late")
+    assert await two.append(2, "2") == 2
+    assert await one.owners.owner(STREAM) == Elsewhere("http://two", 1)
+    await two.owners.give_up("graph/not-owned")
+
+
+async def test_of_two_who_take_a_stream_at_once_one_owns_it(
+    editors: tuple[Editor, Editor],
+) -> None:
+    one, two = editors
+    for n in range(20):
+        stream = f"graph/{n}"
+        found = await asyncio.gather(*(each.owners.owner(stream) for each in (one, two, one, two)))
+        assert found[0] == found[2]
+        assert found[1] == found[3]
+        assert sorted(type(each).__name__ for each in found[:2]) == ["Elsewhere", "Here"]
+
+
+async def test_an_editor_that_has_ended_leaves_its_streams_to_the_others(postgres: Server) -> None:
+    url = postgres.new_database()
+    async with editor(url, "two") as two:
+        async with editor(url, "one") as one:
+            assert await one.epoch() == 1
+            assert await two.owners.owner(STREAM) == Elsewhere("http://one", 1)
+        assert await two.epoch() == 2
+
+
+async def test_a_crash_frees_the_streams_at_once(
+    editors: tuple[Editor, Editor], postgres: Server
+) -> None:
+    one, two = editors
+    assert await one.epoch() == 1
+    await one.journal.close()  # the beats go on; nobody holds the slot
+    assert await two.epoch() == 2
+    await until(lambda: one.lost == [STREAM])
+
+
+async def test_an_editor_whose_session_was_cut_takes_a_slot_again_and_goes_on(
+    editors: tuple[Editor, Editor], postgres: Server
+) -> None:
+    one, two = editors
+    epoch = await one.epoch()
+    cut = (
+        "SELECT pg_terminate_backend(l.pid) FROM pg_locks l JOIN pg_database d ON d.oid = l.database"
+        " WHERE l.locktype = 'advisory' AND l.objsubid = 2 AND l.objid = 0"
+        " AND d.datname = current_database()"
+    )
+    name = postgres.ask("SELECT datname FROM pg_database ORDER BY oid DESC LIMIT 1")
+    await asyncio.to_thread(postgres.sql, cut, name)
+    held = "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND objsubid = 2"
+    async with asyncio.timeout(20):
+        while await asyncio.to_thread(postgres.ask, held, name) != "2":  # noqa: ASYNC110
+            await asyncio.sleep(0.05)
+    await asyncio.sleep(0.6)  # for one more beat
+    assert await two.owners.owner(STREAM) == Elsewhere("http://one", 0)
+    assert await one.append(epoch, "1") == 1
+    assert one.lost == []
+
+
+async def test_an_editor_that_drains_keeps_what_it_has_until_another_needs_it_and_takes_no_more(
+    editors: tuple[Editor, Editor],
+) -> None:
+    one, two = editors
+    epoch = await one.epoch()
+    await one.owners.drain()
+    assert one.owners.draining
+    assert await one.append(epoch, "1") == 1
+    with pytest.raises(Unavailable, match="ending"):
+        await one.owners.owner("graph/other")
+    assert await two.epoch() == 2
+    await until(lambda: one.lost == [STREAM])
+    assert await one.owners.owner(STREAM) == Elsewhere("http://two", 1)
+
+
+async def test_an_editor_that_the_database_does_not_hear_closes_its_rooms_and_goes_on_later(
+    editors: tuple[Editor, Editor], postgres: Server
+) -> None:
+    one, two = editors
+    assert await one.epoch() == 1
+    postgres.stop()
+    try:
+        await until(lambda: one.lost == [STREAM])
+        with pytest.raises(Unavailable, match="which editor has this graph"):
+            await one.owners.owner(STREAM)
+    finally:
+        postgres.start()
+    owner = None
+    async with asyncio.timeout(30):
+        while owner is None:
+            try:
+                owner = await two.owners.owner(STREAM)
+            except Unavailable:
+                await asyncio.sleep(0.1)
+    assert owner in (Here(2), Elsewhere("http://one", 0), Elsewhere("http://one", 1))
