@@ -1,4 +1,4 @@
-/** Above the canvas of a draft: of what it is one, how far both are apart, and what can be done. */
+/** Shows above the canvas of a draft its origin, how far both are apart, and what can be done. */
 import { Button, Modal, Textarea } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconGitBranch } from "@tabler/icons-react";

@@ -103,7 +103,10 @@ export async function layOutGraph(
   requestAnimationFrame(() => context.view.open());
 }
 
-/** Fresh places for some of the actions; the upper left corner of them all stays where it is. */
+/**
+ * Computes fresh places (px) for some of the actions; the upper left corner of them all stays where it is. Null when
+ * the person left or it failed.
+ */
 export async function layOutSome(
   context: EditorContext,
   keys: ReadonlySet<Key>,

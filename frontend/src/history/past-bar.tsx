@@ -1,4 +1,4 @@
-/** Below the canvas while it shows the past: what one sees, the line of all moments, and the way back. */
+/** Shows below the canvas, while that shows the past, which moment it is, the line of all moments, and the way back. */
 import { Button } from "@mantine/core";
 import { IconHistory } from "@tabler/icons-react";
 import { useEffect, useLayoutEffect, useMemo } from "react";

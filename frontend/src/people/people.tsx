@@ -74,7 +74,7 @@ export function People({ me }: { me: string }) {
   );
 }
 
-/** Around the canvas while it shows what somebody else sees. */
+/** Frames the canvas while it follows the view of somebody else, with their name and a button that ends it. */
 export function FollowFrame() {
   useColorsAfterReturn();
   const { whom, follow } = useFollowing();

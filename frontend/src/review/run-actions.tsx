@@ -111,7 +111,7 @@ function ExportButton({ runner, run }: Pick<Props, "runner" | "run">) {
   );
 }
 
-/** Beside the replay: a dry-run that begins where it stands, `at`. */
+/** Opens, from the replay, a dry-run that begins at its moment `at`. */
 export function DryRunFromHere({ run, at }: Pick<Props, "run"> & { at: number | null }) {
   const moment = dryRunMoment(run, at);
   if (run.graph === null || moment === null) return null;

@@ -22,7 +22,10 @@ interface Props {
   onHeld: () => void;
 }
 
-/** Held by pointer, Enter or space; a click that is no hold (a screen reader's) asks first. */
+/**
+ * A button that acts when it was held for `HOLD` ms by pointer, Enter or space. A shorter press, as that of a screen
+ * reader, asks `question` first.
+ */
 export function HoldButton({ label, name, question, disabled = false, size, icon, onHeld }: Props) {
   const [holding, setHolding] = useState(false);
   // Null until it was asked for the first time.

@@ -118,7 +118,10 @@ export function withOwn(
  */
 export const isChangeable = (editAction: EditAction): boolean => editAction.event === undefined;
 
-/** Gives an edit action these keys, and nobody else. What is as it came is not kept. */
+/**
+ * Returns the own shortcuts after an edit action got these keys; other edit actions lose them. Keys that are as they
+ * came are not stored.
+ */
 export function assigned(
   editActions: readonly EditAction[],
   own: OwnShortcuts,

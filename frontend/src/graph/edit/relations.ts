@@ -35,7 +35,7 @@ export function connect(
   return asOneEdit(doc, () => keepingWaits(doc, () => draw(doc, parent, child, outcome, response)));
 }
 
-/** The arrow alone, as a part of an edit that keeps the ends itself. */
+/** Draws the arrow alone, as a part of an edit that keeps the ends itself. Returns as `connect` does. */
 export function draw(
   doc: Y.Doc,
   parent: Key,
@@ -286,12 +286,12 @@ function putBetween(doc: Y.Doc, id: string, key: Key): boolean {
   return true;
 }
 
-/** The graph starts with this action. */
+/** Lets the graph start with this action. Returns the id of the arrow, null as `connect` does. */
 export const setEntry = (doc: Y.Doc, key: Key): string | null => connect(doc, ENTRY, key);
 
 export const unsetEntry = (doc: Y.Doc, key: Key): boolean => disconnect(doc, ENTRY, key);
 
-/** The graph ends after this outcome of the action. */
+/** Lets the graph end after this outcome of the action. Returns the id of the arrow, null as `connect` does. */
 export const setExit = (doc: Y.Doc, key: Key, outcome: Precondition = "on_true"): string | null =>
   connect(doc, key, EXIT, outcome);
 

@@ -27,7 +27,7 @@ function Layer({ name, children }: { name: string | undefined; children: ReactNo
 
 const AGAIN = 1_000; // ms until what could not be drawn is tried again
 
-/** Around the notices: what cannot be said of a Stop keeps nobody from pressing it. */
+/** Contains a fault of the notices: STOP can be pressed all the same. */
 class Guard extends Component<{ children: ReactNode }, { failed: boolean }> {
   override state = { failed: false };
   #timer: ReturnType<typeof setTimeout> | undefined;
