@@ -14,7 +14,7 @@ from sqlalchemy.dialects.postgresql import insert
 from action_assistant.errors import CannotStart, Conflict, Unavailable
 from action_assistant.journal.events import Addition, Draft, Event, Fold, nothing
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.slots import before_first, slot_of
+from action_assistant.journal.slots import Cursor, before_first, slot_of
 from action_assistant.schema import editor_tables
 from journal.servers import Server
 
@@ -208,3 +208,26 @@ async def test_writers_of_shared_streams_whose_connections_are_cut_lose_nothing(
     assert await journals[0].verify() == []
     for each in journals:
         await each.close()
+
+
+async def test_a_reader_gets_each_event_of_all_writers_once_whoever_stored_it_when(
+    postgres: Server,
+) -> None:
+    url = postgres.new_database()
+    writers = [await opened(url) for _ in range(3)]
+    reader = writers[1]
+    chance = random.Random(45)
+    seen: list[Event] = []
+    moment = await reader.cursor()
+    for _ in range(30):
+        some = [chance.choice(writers) for _ in range(chance.randrange(6))]
+        await asyncio.gather(*(each.append("people", [draft()] * 3) for each in some))
+        page = await reader.read_since(Cursor.parse(str(moment)))
+        seen += page
+        for each in page:
+            moment = moment.after(each.position)
+    assert moment == await reader.cursor()
+    assert len(seen) == len({each.position for each in seen})
+    assert sorted(each.seq for each in seen) == [each.seq for each in await reader.read("people")]
+    for writer in writers:
+        await writer.close()

@@ -36,7 +36,7 @@ from action_assistant.journal.removal import (
     removed_by,
     taken_out,
 )
-from action_assistant.journal.slots import LogOrder, before_first, pages_in_order, slot_of
+from action_assistant.journal.slots import Cursor, LogOrder, before_first, pages_in_order, slot_of
 from action_assistant.journal.writer import Job, JobOutcomes, Transaction, Writer
 from action_assistant.kit.shared_check import SharedCheck
 from action_assistant.schema.branches import BRANCHES, VERSIONS
@@ -448,24 +448,24 @@ class Journal(JournalReader):
         follower = Follower()
         self._followers.add(follower)
         try:
-            yield self._heard(follower, await self.position())
+            yield self._heard(follower, await self.cursor())
         finally:
             self._followers.discard(follower)
 
-    async def _heard(self, follower: Follower, last: int) -> AsyncIterator[Event]:
-        """Yield new events after the position `last` from the queue of a follower, or from the
+    async def _heard(self, follower: Follower, last: Cursor) -> AsyncIterator[Event]:
+        """Yield new events after the moment `last` from the queue of a follower, or from the
         database if the queue overflowed, until the journal is closed."""
         while True:
             found = await follower.next()
             if found is None:
                 return
-            if not found or found[0].position > last + 1:
-                found = await self.read_all(after=last)
+            if not found or not last.has(found[0].position - 1):
+                found = await self.read_since(last)
                 if len(found) == _PAGE:
                     follower.wake()
             for each in found:
-                if each.position > last:
-                    last = each.position
+                if not last.has(each.position):
+                    last = last.after(each.position)
                     yield each
 
 

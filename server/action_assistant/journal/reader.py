@@ -25,6 +25,7 @@ from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import NOTHING, Head
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.events import BareEvent, Event, StreamSnapshot
+from action_assistant.journal.slots import Cursor, ends_of_slots, later
 from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
 T = TypeVar("T")
@@ -84,6 +85,16 @@ class JournalReader:
         """Return the first `limit` events of all streams with `position > after`, in order of their
         positions."""
         return await self._events(following(after, limit))
+
+    async def read_since(self, moment: Cursor) -> list[Event]:
+        """Return events of all streams that came after a moment, in order of their positions: all of them,
+        or as many as are read at once."""
+        chosen = EVENTS.where(later(_event.position, moment))
+        return await self._events(chosen.order_by(_event.position).limit(_PAGE))
+
+    async def cursor(self) -> Cursor:
+        """Return the moment after the newest event of each writer."""
+        return await self._ask(lambda c: Cursor.at(ends_of_slots(c, _event.position)))
 
     async def newest(self, stream: str) -> int:
         """Return the sequence number of the last event of a stream; 0 if the stream is empty."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Column, Connection, Select, func, select
+from sqlalchemy import Column, ColumnElement, Connection, Select, and_, func, or_, select
 
 #: Writers of one log at the same time, at most: all positions stay below 2**53, so JSON holds them.
 SLOTS: Final = 64
@@ -93,6 +93,21 @@ class Cursor(msgspec.Struct, frozen=True):
         numbers = [*self.numbers, *[0] * (slot + 1 - len(self.numbers))]
         numbers[slot] = position & _MASK
         return Cursor(_trimmed(numbers))
+
+
+def later(position: Column[int], cursor: Cursor) -> ColumnElement[bool]:
+    """Return the condition that an event (by the column `position`) comes after a moment."""
+    last = max(0, len(cursor.numbers) - 1)
+    between = [
+        and_(position > cursor.end_in(slot), position <= before_first(slot + 1))
+        for slot in range(last)
+    ]
+    return or_(*between, position > cursor.end_in(last))
+
+
+def slot_in(position: Column[int]) -> ColumnElement[int]:
+    """Return the slot of an event in a query, by the column `position`."""
+    return position // (1 << _BITS)
 
 
 def _trimmed(numbers: list[int]) -> tuple[int, ...]:

@@ -3464,7 +3464,7 @@ interface EditorOperations {
     followEvents: {
         parameters: {
             query?: {
-                after?: number | null;
+                after?: string | null;
             };
         };
         responses: {

@@ -18,6 +18,7 @@ from action_assistant.editor.log.inbox_events import inbox_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
+from action_assistant.journal.slots import Cursor
 from action_assistant.settings import RunLink, Site
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
@@ -27,8 +28,10 @@ from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.roles import OWNER
 from action_assistant.web.network.addresses import Addresses
-from action_assistant.web.server.openapi import MOST_NUMBER, answer
+from action_assistant.web.server.openapi import answer
 
+#: The form of a moment of the log: a number for each editor that has stored something.
+_MOMENT: Final = r"^\d{1,14}(\.\d{1,14}){0,63}$"
 _SILENCE: Final = 10.0  # seconds of silence after which a sign of life is sent
 
 
@@ -124,7 +127,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
 
     @get(
         "/api/events",
-        summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
+        summary="What is stored, as server-sent events; `after` and Last-Event-ID are moments of the log",
         operation_id="followEvents",
         description="Of graphs that one may see; of the audit for owners, of an inbox for its "
         "person.",
@@ -134,34 +137,37 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
     )
     async def follow_events(
         request: Request[Any, Any, Any],
-        after: Annotated[int | None, Parameter(ge=0, le=MOST_NUMBER)] = None,
+        after: Annotated[str | None, Parameter(pattern=_MOMENT)] = None,
     ) -> ServerSentEvent:
         last = request.headers.get("last-event-id")
-        if last is not None:
-            if not (last.isdecimal() and len(last) < len(str(MOST_NUMBER))):
-                raise BadInput("Last-Event-ID is the number of an event.")
-            after = int(last)
-        return ServerSentEvent(_told(app_state, after, identity_of(request)))
+        moment = after if last is None else last
+        try:
+            known = None if moment is None else Cursor.parse(moment)
+        except ValueError:
+            raise BadInput(
+                "`after` and Last-Event-ID are the id of an event of this stream."
+            ) from None
+        return ServerSentEvent(_told(app_state, known, identity_of(request)))
 
     return [get_config, list_people, list_examples, follow_events]
 
 
 async def _told(
-    app_state: EditorState, after: int | None, identity: Identity
+    app_state: EditorState, after: Cursor | None, identity: Identity
 ) -> AsyncIterator[ServerSentEventMessage]:
-    """Yield, as events of an HTTP event stream, the stored events after the position `after` (None:
+    """Yield, as events of an HTTP event stream, the stored events after the moment `after` (None:
     no old ones), then new events as they are stored, without end. While none comes, yield a comment
     now and then."""
     services = app_state.services
     async with services.journal.follow() as events:
-        done = await services.journal.position() if after is None else after
-        while after is not None and (page := await services.journal.read_all(after=done)):
+        done = await services.journal.cursor() if after is None else after
+        while after is not None and (page := await services.journal.read_since(done)):
             sees = await services.rights.sight(identity)
             for event in page:
+                done = done.after(event.position)
                 graph = h.graph_of(event.stream)
                 if _concerns(event.stream, identity) and (graph is None or sees(graph)):
-                    yield _message(app_state, event)
-            done = page[-1].position
+                    yield _message(app_state, event, done)
         coming = asyncio.ensure_future(anext(events))
         try:
             while True:
@@ -173,8 +179,9 @@ async def _told(
                 coming = asyncio.ensure_future(anext(events))
                 graph = h.graph_of(event.stream)
                 hidden = graph is not None and not await services.rights.may_see(graph, identity)
-                if event.position > done and not hidden and _concerns(event.stream, identity):
-                    yield _message(app_state, event)
+                is_new, done = not done.has(event.position), done.after(event.position)
+                if is_new and not hidden and _concerns(event.stream, identity):
+                    yield _message(app_state, event, done)
         except StopAsyncIteration:  # the journal is closed
             return
         finally:
@@ -191,7 +198,7 @@ def _concerns(stream: str, identity: Identity) -> bool:
     return not is_audit(stream) and (is_own or not is_inbox)
 
 
-def _message(app_state: EditorState, event: Event) -> ServerSentEventMessage:
+def _message(app_state: EditorState, event: Event, moment: Cursor) -> ServerSentEventMessage:
     happened = StoredEvent(
         event.position,
         event.stream,
@@ -202,4 +209,4 @@ def _message(app_state: EditorState, event: Event) -> ServerSentEventMessage:
         h.graph_of(event.stream),
     )
     data = msgspec.json.encode(happened).decode()
-    return ServerSentEventMessage(data=data, event=event.kind, id=event.position)
+    return ServerSentEventMessage(data=data, event=event.kind, id=str(moment))

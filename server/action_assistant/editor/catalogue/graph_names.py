@@ -18,6 +18,7 @@ from sqlalchemy import Row, func, select
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.errors import NotFound, Refused, TooLarge
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.slots import Cursor, later, slot_in
 from action_assistant.schema import editor_tables
 from action_assistant.schema.editor_tables import editor_event, editor_head
 from action_assistant.web.auth.caller import Caller, set_caller
@@ -62,7 +63,7 @@ class GraphNames:
         self._refreshing = Lock()
         self._next: asyncio.Task[None] | None = None  # has not begun yet
         self._tasks: set[asyncio.Task[None]] = set()
-        self._position: int | None = None
+        self._seen: Cursor | None = None
         self._seqs: dict[str, int] = {}
         self._documents: dict[str, _Document] = {}
         self._again: set[str] = set()  # whose reading died
@@ -99,7 +100,7 @@ class GraphNames:
     @property
     def are_read(self) -> bool:
         """Return whether every name was read once, so that a refresh reads only what has changed since."""
-        return self._position is not None
+        return self._seen is not None
 
     async def refresh(self) -> None:
         """Read the names that were stored since the last call. Raise Unavailable if the journal
@@ -135,7 +136,7 @@ class GraphNames:
         set_caller(_OURSELVES)  # it goes on although the first caller has left
         async with self._refreshing:
             self._next = None  # later callers may know of newer events
-            position, seqs, abouts = await self._news()
+            seen, seqs, abouts = await self._news()
             self._seqs |= seqs
             changed = await self._look_up(abouts)
             changed |= (seqs.keys() | self._again) & self._documents.keys()
@@ -152,32 +153,34 @@ class GraphNames:
                     for graph in some:
                         if graph not in known:
                             reading.start_soon(self._read, graph, limit)
-            self._position = position
+            self._seen = seen
 
-    async def _news(self) -> tuple[int, dict[str, int], set[str]]:
-        """Return the position of the last event that was read, the newest change of each document
+    async def _news(self) -> tuple[Cursor, dict[str, int], set[str]]:
+        """Return the moment up to which events were read, the newest change of each document
         that has changed since the last call, and the ids of the documents about which there are
         other new events."""
-        if self._position is None:
-            position = await self._journal.position()
+        seen = self._seen
+        if seen is None:
+            seen = await self._journal.cursor()
             rows = await self._journal.query(select(editor_head.c.stream, editor_head.c.seq))
         else:
             event = editor_event.c
             newest = select(
                 event.stream, func.max(event.seq).label("seq"), func.max(event.position).label("at")
             )
-            chosen = newest.where(event.position > self._position).group_by(event.stream)
-            rows = await self._journal.query(chosen)
-            position = max((row.at for row in rows), default=self._position)
+            chosen = newest.where(later(event.position, seen))
+            rows = await self._journal.query(chosen.group_by(event.stream, slot_in(event.position)))
+            for row in rows:
+                seen = seen.after(row.at)
         seqs: dict[str, int] = {}
         abouts: set[str] = set()
         for row in rows:
             kind, _, graph = row.stream.partition("/")
             if kind == "graph":
-                seqs[graph] = row.seq
+                seqs[graph] = max(row.seq, seqs.get(graph, 0))
             elif kind == "about":
                 abouts.add(graph)
-        return position, seqs, abouts
+        return seen, seqs, abouts
 
     async def _look_up(self, abouts: Collection[str]) -> set[str]:
         """Read the rows of the documents with the ids `abouts` from the tables. Forget documents

@@ -22,6 +22,7 @@ from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import NotFound
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.slots import Cursor, later, slot_in
 from action_assistant.schema.editor_tables import (
     editor_event,
     editor_head,
@@ -108,7 +109,7 @@ class GraphPages:
         self._rights = rights
         self._catalogue = catalogue
         self._renewing = asyncio.Lock()
-        self._position: int | None = None  # up to which rows are known to be right, or in work
+        self._seen: Cursor | None = None  # up to which rows are known to be right, or in work
 
     async def page(
         self,
@@ -234,7 +235,7 @@ class GraphPages:
         found by what was known before."""
         async with self._renewing:
             await self._checks.facts.write()
-            position, changed = await self._changed()
+            seen, changed = await self._changed()
             await self._checks.facts.note_changes(changed)
             if len(changed) <= _READ and await self._has_names(changed):
                 await self._checks.facts.recall([each.id for each in changed])
@@ -246,7 +247,7 @@ class GraphPages:
                 await self._checks.facts.write()
             else:
                 self._checks.compute_later({each.id: each.seq for each in changed})
-            self._position = position
+            self._seen = seen
 
     async def _has_names(self, changed: Sequence[ChangedGraph]) -> bool:
         """Return whether the names of all graphs are known, by which those inside of others are
@@ -261,23 +262,26 @@ class GraphPages:
         await names.refresh()
         return True
 
-    async def _changed(self) -> tuple[int, list[ChangedGraph]]:
-        """Return the position of the last event that was seen, and the graphs whose rows are not
+    async def _changed(self) -> tuple[Cursor, list[ChangedGraph]]:
+        """Return the moment up to which events were seen, and the graphs whose rows are not
         right any more."""
-        if self._position is None:
-            position = await self._journal.position()
-            return position, _changes(await self._journal.query(_outdated()))
+        seen = self._seen
+        if seen is None:
+            seen = await self._journal.cursor()
+            return seen, _changes(await self._journal.query(_outdated()))
         event = editor_event.c
         news = select(event.stream, func.max(event.position).label("at"))
         streams = await self._journal.query(
-            news.where(event.position > self._position).group_by(event.stream)
+            news.where(later(event.position, seen)).group_by(event.stream, slot_in(event.position))
         )
         ids = sorted({each for row in streams if (each := graph_of(row.stream)) is not None})
         found: list[ChangedGraph] = []
         for start in range(0, len(ids), _AT_ONCE):
             some = graph.c.id.in_(ids[start : start + _AT_ONCE])
             found += _changes(await self._journal.query(_outdated().where(some)))
-        return max((row.at for row in streams), default=self._position), found
+        for row in streams:
+            seen = seen.after(row.at)
+        return seen, found
 
 
 def _outdated() -> Select[Any]:

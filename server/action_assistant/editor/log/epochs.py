@@ -18,7 +18,7 @@ import msgspec
 from sqlalchemy import select
 
 from action_assistant.editor.log import graph_events as h
-from action_assistant.errors import Unavailable
+from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.private_files import DamagedFile, read_json, replace_file
 from action_assistant.schema import editor_tables
@@ -48,11 +48,12 @@ class EpochMark(msgspec.Struct, frozen=True):
     chain: str
 
 
-async def begin(journal: Journal, why: Why) -> str:
+async def begin(journal: Journal, why: Why, *, after: int | None = None) -> str:
     """Begin an epoch (a new history of all graphs, as after a restored backup) and return its id.
-    `why`: the reason, for the log. Raise Unavailable if the journal cannot be written."""
+    `why`: the reason, for the log; `after`: how many there were (None: any number). Raise Conflict if
+    there are more by now, Unavailable if the journal cannot be written."""
     begun = EpochBegun(secrets.token_hex(8), why)
-    await journal.append(_STREAM, [h.draft(h.EPOCH, h.SERVER, begun)])
+    await journal.append(_STREAM, [h.draft(h.EPOCH, h.SERVER, begun)], expected=after)
     return begun.id
 
 
@@ -80,7 +81,10 @@ async def living_in(journal: Journal, data: Path) -> AsyncIterator[str]:
 async def _epoch(journal: Journal, mark: Path) -> str:
     newest = await journal.newest(_STREAM)
     if newest == 0:
-        return await begin(journal, "the first")
+        try:
+            return await begin(journal, "the first", after=0)
+        except Conflict:  # another editor began it just now
+            newest = await journal.newest(_STREAM)
     (event,) = await journal.read(_STREAM, after=newest - 1)
     epoch = msgspec.json.decode(event.body, type=EpochBegun).id
     if await _follows(journal, marked(mark)):
