@@ -10,6 +10,7 @@ import httpx
 import httpx_ws
 import pytest
 from pycrdt import Doc, Map
+from wsproto.utilities import LocalProtocolError
 
 from action_assistant.editor.crdt import messages
 from editor.process import Editor, running
@@ -52,7 +53,11 @@ class Hand:
                 async with self._editor.socket(self._graph, "?acks=1") as session:
                     await self._converse(session)
                     return True
-            except* (httpx_ws.HTTPXWSException, httpx.TransportError) as gone:
+            except* (
+                httpx_ws.HTTPXWSException,
+                httpx.TransportError,
+                LocalProtocolError,  # it closes while something is being sent
+            ) as gone:
                 raise ConnectionError from gone
         return False
 
