@@ -6,6 +6,7 @@ import pytest
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.links.port import Leaves, Order, unwatched
 from action_assistant.runner.runs import queries
+from action_assistant.runner.start.idempotency import STOPPED_WITH
 from runner.harness import ANN, BEN, Harness, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet, group
 
@@ -90,3 +91,25 @@ async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> No
         harness.journal.down = False
         control.stop_all(ANN)
         await until(lambda: not control.open)
+
+
+@pytest.mark.parametrize("press", ["its run", "its robot"])
+@virtual
+async def test_after_a_stop_of_one_run_the_others_of_its_start_begin_no_more(press: str) -> None:
+    harness, david, eve = Harness(), Open(NEVER), Open(NEVER)
+    async with fleet(harness, David=david, Eve=eve) as control:
+        asked = group(sequence(), "David", "Eve")
+        harness.journal.slow = 0.5
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(control.start_group, asked, ANN)
+            await until(lambda: bool(david.starts))
+            (run,) = control.open
+            if press == "its run":
+                assert await control.stop(run, BEN) == [run]
+            else:
+                control.stop_robot("David", BEN)
+        assert eve.starts == []
+        await until(lambda: not control.open)
+        other = await control.find((await control.start_group(asked, ANN)).runs[1].id)
+        assert (other.engine, other.state) == ("Eve", "refused")
+        assert other.detail == STOPPED_WITH

@@ -66,7 +66,7 @@ from action_assistant.runner.start.admission import (
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.drills import DrillRequest, drill_of
-from action_assistant.runner.start.idempotency import StopOrder
+from action_assistant.runner.start.idempotency import STOPPED_WITH, StopOrder
 from action_assistant.runner.start.led_items import IndexingWords
 from action_assistant.runner.start.orders import Often, watched_in
 from action_assistant.runner.start.preflight import Preflight
@@ -429,6 +429,8 @@ class ExecutionService:
         opened = self.open[run]
         if opened.run.end is not None:
             return False
+        if opened.run.group:
+            self._stops.refuse(opened.run.group, STOPPED_WITH)
         opened.stop(author, stop_id)
         return True
 

@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 from weakref import WeakValueDictionary
 
 import anyio
@@ -20,6 +20,9 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
 from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.auth.caller import BackgroundTasks
+
+#: Why a start on one of several robots does not leave any more.
+STOPPED_WITH: Final = "A run that was started with it was stopped before it began."
 
 
 class StopOrder:
