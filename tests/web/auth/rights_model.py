@@ -57,7 +57,9 @@ OF_UNKNOWN_GRAPHS: Final = re.compile(
     r"get /api/robots/\{name\}/(events/\{seq\}/umrf|recordings/\{file\})$"
 )
 #: What is inside a graph: for those who may see all of that.
-OF_INSIDES: Final = re.compile(r"\{graph_id\}/(subgraphs(\.zip)?|flat)$|/\{version_id\}(/sight)?$")
+OF_INSIDES: Final = re.compile(
+    r"\{graph_id\}/(subgraphs(\.zip)?|flat)$|/\{version_id\}(/sight|/breakpoints)?$"
+)
 #: Graphs: without a rule; which the group may read, or edit; for owners; in a folder of the group; a draft
 #: of what the group may edit; without a rule, around a graph for owners.
 GRAPHS: Final = ("open", "read", "edited", "hidden", "filed", "draft", "around")
