@@ -3,7 +3,8 @@ acknowledged and that it does not know of, and an edit that was answered with su
 
 import asyncio
 import copy
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from action_assistant.commands.client import Server
 from action_assistant.commands.sync.folder import Folder
 from action_assistant.commands.sync.sync import SyncRound
+from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.room import Room
@@ -29,7 +31,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
 Places: TypeAlias = set[tuple[str, str]]
 
-TRIES: Final = 5  # of the server, of an edit that others overtake
+#: Tries of the server, of an edit that others overtake, where the edits of others never wait.
+TRIES: Final = 5
+#: Tries after which they wait while the edit is computed.
+FREE_TRIES: Final = 2
 CLIENTS: Final = (1, 2**53 - 1)  # the least and the greatest
 MARIS, EVES = "M" * 12, "E" * 12  # keys of actions
 
@@ -170,14 +175,29 @@ rounds = st.lists(
 )
 
 
+@contextmanager
+def computing(*, is_quick: bool) -> Iterator[None]:
+    """Let the edits of others wait as long as they do for an edit of the server, or never."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not is_quick:
+            patch.setattr(server_edits, "HELD_S", 0)
+        yield
+
+
 @settings(max_examples=examples(150), suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(command=st.sampled_from(COMMANDS), rounds=rounds, client=st.sampled_from(CLIENTS))
+@given(
+    command=st.sampled_from(COMMANDS),
+    rounds=rounds,
+    client=st.sampled_from(CLIENTS),
+    is_quick=st.booleans(),
+)
 async def test_an_edit_of_the_server_knows_every_edit_before_it(
     here: EditorHere,
     owner: httpx.AsyncClient,
     command: str,
     rounds: Sequence[tuple[Sequence[int], bool]],
     client: int,
+    is_quick: bool,
 ) -> None:
     graph = (await owner.post("/api/graphs", json=file("Pair"))).json()["id"]
     async with here.services.rooms.enter(graph_stream(graph)) as room:
@@ -199,12 +219,13 @@ async def test_an_edit_of_the_server_knows_every_edit_before_it(
             if is_acknowledged and sent:
                 await sent[-1]
 
-        with meanwhile(edit):
+        with computing(is_quick=is_quick), meanwhile(edit):
             answer = await getattr(case, command)()
         acknowledged = [await each for each in sent]
         last += len(acknowledged)
         expected = getattr(case, f"after_{command}")(copy.deepcopy(wanted), touched)
-        if all(edits for edits, _ in [*rounds, ([], True)][:TRIES]) or expected is None:
+        overtakes = all(edits for edits, _ in [*rounds, ([], True)][:TRIES])
+        if (overtakes and not is_quick) or expected is None:
             assert answer.status_code == 409, answer.text
             is_overtaken = tries == TRIES
             assert answer.json()["type"] == ("overtaken" if is_overtaken else "conflict")
@@ -212,6 +233,7 @@ async def test_an_edit_of_the_server_knows_every_edit_before_it(
             assert room.seq == last
         else:
             assert answer.is_success, answer.text
+            assert tries <= FREE_TRIES or not is_quick
             assert await maps_in(room) == expected
             assert room.seq == last + (expected != wanted)
             if command == "put":
@@ -379,7 +401,8 @@ async def test_a_file_whose_change_others_overtook_is_sent_in_the_next_round_and
     (path,) = [each for each in folder.glob(f"*{ENDING}") if each.name[0] != "."]
     path.write_text(path.read_text().replace('"Pair"', '"Couple"'))
     async with here.services.rooms.enter(graph_stream(graph)) as room:
-        with meanwhile(overtaking(Page(room, "eve", 1), times=TRIES)):
+        eve = overtaking(Page(room, "eve", 1), times=TRIES)
+        with computing(is_quick=False), meanwhile(eve):
             (left,) = await synced()
         assert "it was not made here; try again" in left
         assert [each.name for each in folder.glob(f"*{ENDING}*") if each.name[0] != "."] == [

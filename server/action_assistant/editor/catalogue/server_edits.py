@@ -1,10 +1,12 @@
 """Edits that the server makes itself: made on a copy, then submitted to the room as one update (rule R9)."""
 
+import time
 from collections.abc import Awaitable, Callable
 from typing import Final, Generic, NamedTuple, TypeVar
 
 from action_assistant.editor.interchange.document_edits import calling_actions, renaming, restoring
 from action_assistant.editor.log.graph_events import DocumentKind
+from action_assistant.editor.rooms.batch import HELD_S
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import Overtaken
 from action_assistant.web.workers.lanes import RunInWorker, run_here
@@ -12,6 +14,8 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 T = TypeVar("T")
 
 _TRIES: Final = 5
+#: Tries after which the edits of others wait while the edit is computed, if that is quick.
+_FREE_TRIES: Final = 2
 
 
 class StoredEdit(NamedTuple, Generic[T]):
@@ -28,6 +32,33 @@ class StoredEdit(NamedTuple, Generic[T]):
         return self.seq > self.before
 
 
+class _Computing(Generic[T]):
+    """Computes an edit of the server. `took`: the seconds of the last time, also if that failed."""
+
+    def __init__(
+        self, compute: Callable[[bytes, int], Awaitable[T]], update_of: Callable[[T], bytes]
+    ) -> None:
+        self._compute = compute
+        self._update_of = update_of
+        self._last: tuple[T, int]
+        self.took = 0.0
+
+    async def update(self, state: bytes, seq: int) -> bytes:
+        """Compute the edit from a document (encoded) and the number of its last change, and return
+        its update."""
+        begun = time.monotonic()
+        try:
+            computed = await self._compute(state, seq)
+        finally:
+            self.took = time.monotonic() - begun
+        self._last = computed, seq
+        return self._update_of(computed)
+
+    def stored(self, seq: int) -> StoredEdit[T]:
+        """Return the edit that was computed last, once it is stored. `seq`: its number."""
+        return StoredEdit(*self._last, seq)
+
+
 async def store(
     room: Room,
     author: str,
@@ -39,20 +70,25 @@ async def store(
     """Store an edit of the server that depends on what the document holds, in the name of `author`.
     `compute` is given the document (encoded) and the number of its last change; `update_of` returns
     the update of what it returns. If people change the document meanwhile, it is computed again: an
-    update made without their edits could remove or replace what they have set. Where it cannot, since it
-    sets values of its own only (`insists`), it is stored at the last try whatever they have changed.
-    Raise what `compute` raises; Overtaken, when nothing is stored, if people were faster a few times;
-    BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable if the
-    room is closed or the edit cannot be stored."""
-    for tries_left in reversed(range(_TRIES)):
-        before, state = await room.now()
-        computed = await compute(state, before)
+    update made without their edits could remove or replace what they have set. After a few times their
+    edits wait meanwhile, unless to compute it takes longer than `HELD_S`; `compute` must not ask the
+    room. Where it sets values of its own only (`insists`), it is stored at the last try whatever they
+    have changed. Raise what `compute` raises; Overtaken, when nothing is stored, if people were faster
+    each time; BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable
+    if the room is closed or the edit cannot be stored."""
+    computing = _Computing(compute, update_of)
+    for tries in range(_TRIES):
         try:
-            expected = before if tries_left or not insists else None
-            seq = await room.submit(update_of(computed), author, expected=expected)
+            if tries >= _FREE_TRIES and computing.took < HELD_S:
+                seq = await room.submit_in_turn(author, computing.update)
+            else:
+                before, state = await room.now()
+                update = await computing.update(state, before)
+                expected = None if insists and tries + 1 == _TRIES else before
+                seq = await room.submit(update, author, expected=expected)
         except Overtaken:
             continue
-        return StoredEdit(computed, before, seq)
+        return computing.stored(seq)
     raise Overtaken(
         f"Others have changed this {_TRIES} times while the edit was worked out, so it was not made "
         "here; try again."

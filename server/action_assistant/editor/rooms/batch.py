@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextvars import Context
 from typing import Final, NamedTuple, TypeAlias, TypeVar
 
@@ -19,8 +19,8 @@ from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, 
 from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 from action_assistant.editor.crdt.updates.update_scan import outline
 from action_assistant.editor.rooms.member import Member
-from action_assistant.errors import BadInput, Refused, TooLarge
-from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.errors import BadInput, Overtaken, Refused, TooLarge, Unavailable
+from action_assistant.web.auth.caller import Origin, acting_for, origin_of
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -33,6 +33,12 @@ _BUSY: Final = 0.7  # share of its processor that the loop works, from which on 
 _MEASURED_S: Final = 0.1  # over which that share is measured
 #: Bytes of an update that is tried on a copy first, and is a batch of its own.
 LARGE: Final = 8 * 1024
+#: For how long the edits of others may wait at most while the server computes one.
+HELD_S: Final = 3.0
+CLOSING: Final = "This graph is being closed; try again."
+_TOO_LONG: Final = (
+    "To work this edit out takes too long to let the edits of others wait; try again."
+)
 _BATCH_ITEMS: Final = 200  # of one commit
 _BATCH_BYTES: Final = 512 * 1024
 _CRASHES: Final = 2  # of workers that try an update, after which the update counts as their cause
@@ -161,8 +167,56 @@ class NameRequest(msgspec.Struct, frozen=True):
     done: "asyncio.Future[str]"
 
 
+class HeldTurn:
+    """A request of the server to compute an edit in the name of `author` while no other edit is
+    applied."""
+
+    def __init__(self, author: str) -> None:
+        loop = asyncio.get_running_loop()
+        self._author = author
+        self._done: asyncio.Future[int] = loop.create_future()
+        self._begun: asyncio.Future[DocumentState] = loop.create_future()
+        self._edit: asyncio.Future[SubmittedEdit] = (
+            loop.create_future()
+        )  # cancelled if there is none
+
+    async def take(self, compute: Callable[[bytes, int], Awaitable[bytes]]) -> int:
+        """Wait for the turn, compute the update in it, and return the number of the edit after its
+        commit. Raise what `compute` raises; Overtaken if it takes longer than `HELD_S` seconds."""
+        try:
+            seq, state = await self._begun
+            async with asyncio.timeout(HELD_S):
+                update = await compute(state, seq)
+            if self._edit.cancelled():
+                raise Unavailable(CLOSING)
+            origin = origin_of(self._author)
+            self._edit.set_result(
+                SubmittedEdit(update, self._author, done=self._done, origin=origin, expected=seq)
+            )
+        except TimeoutError:
+            raise Overtaken(_TOO_LONG) from None
+        finally:
+            self._edit.cancel()  # if there is none: the room goes on
+        return await self._done
+
+    async def begin(self, document: DocumentState) -> SubmittedEdit | None:
+        """Begin the turn with the document as it is. Return the edit once it is computed; None if
+        there is none."""
+        if not self._begun.done():  # else the caller has left
+            self._begun.set_result(document)
+        await asyncio.wait([self._edit])
+        return None if self._edit.cancelled() else self._edit.result()
+
+    def end(self, reason: Refused) -> None:
+        """Raise `reason` where the server waits for the turn or its edit, or let no edit come of it."""
+        if not self._begun.done():
+            self._begun.set_exception(reason)
+        if not self._edit.cancel() and not self._edit.cancelled():
+            fail(self._edit.result(), reason)
+
+
 ReadRequest: TypeAlias = StateRequest | NameRequest
-QueueItem: TypeAlias = SubmittedEdit | SyncRequest | ComparisonRequest | ReadRequest
+QueueItem: TypeAlias = SubmittedEdit | SyncRequest | ComparisonRequest | ReadRequest | HeldTurn
 
 
 class BatchOutcome:
@@ -286,9 +340,12 @@ async def tried_first(
 
 def fail(item: QueueItem, reason: Refused) -> None:
     """Raise `reason` where the server waits for this item. Sockets are closed by the room."""
-    if isinstance(item, SyncRequest | ComparisonRequest) or item.done is None or item.done.done():
-        return
-    item.done.set_exception(reason)
+    match item:
+        case HeldTurn():
+            item.end(reason)
+        case SubmittedEdit(done=done) | StateRequest(done) | NameRequest(done):
+            if done is not None and not done.done():
+                done.set_exception(reason)
 
 
 async def tried_for(
@@ -336,15 +393,17 @@ def batch_of(
     items: list[QueueItem], *, one: bool = False
 ) -> tuple[list[QueueItem], list[QueueItem]]:
     """Return the items of the next commit, and the remaining items. A batch is small enough for
-    clients that read in time; a large update is a batch of its own; with `one` every item is."""
+    clients that read in time; a large update and a held turn are batches of their own; with `one`
+    every item is."""
     size = count = 0
     for item in items[: 1 if one else _BATCH_ITEMS]:
         own = len(item.update) if isinstance(item, SubmittedEdit) else 0
+        is_alone = own > LARGE or isinstance(item, HeldTurn)
         size += own
-        if count and (size > _BATCH_BYTES or own > LARGE):
+        if count and (size > _BATCH_BYTES or is_alone):
             break
         count += 1
-        if own > LARGE:
+        if is_alone:
             break
     return items[:count], items[count:]
 

@@ -9,7 +9,7 @@ import asyncio
 import logging
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Coroutine, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Collection, Coroutine, Iterator, Sequence
 from functools import partial
 from typing import Any, Final
 
@@ -27,12 +27,14 @@ from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES
 from action_assistant.editor.documents.document import name_of
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
+    CLOSING,
     LARGE,
     OBJECTIONS,
     BatchOutcome,
     BatchWindow,
     ComparisonRequest,
     DocumentState,
+    HeldTurn,
     NameRequest,
     NotAllowed,
     Objection,
@@ -71,7 +73,6 @@ _ACK_BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 
 #: Intervals that an announcement waits for an update to go along with.
 _ANNOUNCEMENT_WAIT: Final = 1.5
 _DAMAGED: Final = "This graph can only be read: change {} of its history is damaged."
-_CLOSING: Final = "This graph is being closed; try again."
 _OVERTAKEN: Final = "Others have changed this graph meanwhile; try again."
 _ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
@@ -292,6 +293,7 @@ class Room:
         self._opening_time: Final = OpeningTimeMeasurement(stream, tried)
         self._waiting: list[QueueItem] = []
         self._batch: list[QueueItem] = []  # being processed
+        self._one_held_turn: Final = asyncio.Lock()  # at a time: between two, others have theirs
         self._ended = self._is_busy = False
         self._loop = asyncio.get_running_loop()
         self._idle = asyncio.Event()
@@ -351,14 +353,24 @@ class Room:
         stored. `expected`: the change after which the edit was computed. Raise Overtaken if
         it is not the last one when the turn of the edit comes; else return the number of the edit
         itself, or `expected` if it changed nothing."""
-        if self.damaged is not None:
-            raise Conflict(_DAMAGED.format(self.damaged.seq))
-        if self._ended:
-            raise Unavailable(_CLOSING)
+        self._require_edits()
         done: asyncio.Future[int] = self._loop.create_future()
         origin = origin_of(author)
         self._enqueue(SubmittedEdit(update, author, None, done, origin=origin, expected=expected))
         return await done
+
+    async def submit_in_turn(
+        self, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
+    ) -> int:
+        """Do what `submit` does with the edit that `compute` returns for the document (encoded) and
+        the number of its last change. Edits of others wait meanwhile, so that none can overtake this
+        one. `compute` must not ask this room. Raise what `compute` raises; Overtaken if it takes
+        longer than `HELD_S` seconds."""
+        async with self._one_held_turn:
+            self._require_edits()
+            turn = HeldTurn(author)
+            self._enqueue(turn)
+            return await turn.take(compute)
 
     async def now(self) -> DocumentState:
         """Return the document once all earlier edits are committed. Raise Unavailable if the room
@@ -376,7 +388,7 @@ class Room:
 
     def _ask(self, request: ReadRequest) -> None:
         if self._ended:
-            raise Unavailable(_CLOSING)
+            raise Unavailable(CLOSING)
         self._enqueue(request)
 
     async def quiet(self) -> Replica:
@@ -384,7 +396,7 @@ class Room:
         until the next `await`. Raise Unavailable if the room is closed."""
         await self._idle.wait()
         if self._ended:
-            raise Unavailable(_CLOSING)
+            raise Unavailable(CLOSING)
         return self._replica
 
     async def close_if_unused(self, is_needed: Callable[[], bool]) -> None:
@@ -401,12 +413,18 @@ class Room:
         """Finish the batch being processed, then close all sockets."""
         await self._idle.wait()
         if not self._ended:
-            self._end(Unavailable(_CLOSING))
+            self._end(Unavailable(CLOSING))
+
+    def _require_edits(self) -> None:
+        if self.damaged is not None:
+            raise Conflict(_DAMAGED.format(self.damaged.seq))
+        if self._ended:
+            raise Unavailable(CLOSING)
 
     def end(self) -> None:
         """Close all sockets at once, so that clients connect again. Edits that are being stored are not
         acknowledged."""
-        self._end(Unavailable(_CLOSING))
+        self._end(Unavailable(CLOSING))
 
     # --- batch after batch ----------------------------------------------------------------------
 
@@ -427,6 +445,8 @@ class Room:
             batch, self._waiting, needs_trial = next_batch(self._waiting, self._replica)
             self._batch = batch
             match batch:
+                case [HeldTurn() as turn]:
+                    self._start_slow_work(self._apply_held(turn))
                 case [SubmittedEdit() as edit] if needs_trial:
                     self._start_slow_work(self._apply_after_trial(edit))
                 case _:
@@ -451,7 +471,7 @@ class Room:
             return
         try:
             if seq is None:
-                raise error or Unavailable(_CLOSING)
+                raise error or Unavailable(CLOSING)
             self.seq = seq
             self._snapshots.grew(sum([len(edit.update) for edit, _ in outcome.to_store]))
             self._after_commit(outcome)
@@ -497,7 +517,7 @@ class Room:
     def _fail(self, error: BaseException) -> None:
         """Log an error and end the room; the next one is loaded from the log. Raise an error again
         that ends a task or the process."""
-        reason = error if isinstance(error, Refused) else Unavailable(_CLOSING)
+        reason = error if isinstance(error, Refused) else Unavailable(CLOSING)
         with about("graph", self._graph):
             if isinstance(error, Refused):
                 log.error("%s: an edit could not be stored: %s", self.stream, error.detail)
@@ -526,6 +546,15 @@ class Room:
                 self._waiting = [*batch[n + 1 :], *self._waiting]
                 break
         return outcome
+
+    async def _apply_held(self, turn: HeldTurn) -> None:
+        """Let the server compute an edit of the document as it is, and apply that."""
+        edit = await turn.begin(DocumentState(self.seq, self._replica.state()))
+        if edit is None:
+            self._store(BatchOutcome())
+            return
+        self._batch = [edit]
+        await self._apply_after_trial(edit)
 
     async def _apply_after_trial(self, edit: SubmittedEdit) -> None:
         """Try one edit on a copy of the document, and apply it if that went well: how long an update takes
