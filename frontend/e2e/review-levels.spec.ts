@@ -163,7 +163,7 @@ function packagesOf(actions: string[]): string {
   return packages;
 }
 
-const NAME = "Write them where David looks them up";
+const NAME = "Write the graphs where David looks them up";
 
 /** What is looked at before a start on David. */
 async function lookedAtDavid(page: Page) {

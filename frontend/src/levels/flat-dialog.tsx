@@ -26,7 +26,7 @@ function Reasons({ reasons, context, onClose }: Props & { reasons: readonly Flat
   return (
     <>
       <p>A flattened graph would behave differently from this one, so none is made:</p>
-      <ReasonList label="Why no graph is made" {...{ reasons, context, onClose }} />
+      <ReasonList label="Why the graph cannot be flattened" {...{ reasons, context, onClose }} />
     </>
   );
 }

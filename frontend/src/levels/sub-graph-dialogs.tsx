@@ -243,7 +243,7 @@ function ExtractRefusal({ look, context, onClose }: ExtractProps & { look: Extra
     <>
       <p>No graph can be made of exactly these actions:</p>
       <ReasonList
-        label="Why no graph is made"
+        label="Why no sub-graph can be made"
         reasons={look.reasons ?? []}
         told={ofGraph(context)}
         {...{ context, onClose }}

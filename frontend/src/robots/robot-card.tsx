@@ -79,7 +79,7 @@ function robotSigns(robot: Robot, now: number): Sign[] {
     signs.push({ good: state === "fine", text: `${text}: ${isolated(topic)}`, age });
   }
   if (robot.page_presence !== null) {
-    const text = `Asks for whoever runs something: ${pageWords(robot.page_presence)}`;
+    const text = `A page has to stay visible: ${pageWords(robot.page_presence)}`;
     signs.push({ good: true, text });
   }
   if (robot.others > 0) {

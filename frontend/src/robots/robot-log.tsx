@@ -55,7 +55,7 @@ function batonText({ how, sender, was, to, why }: RobotLogLine): string {
     case "fell":
       return `The baton of ${isolated(was)} fell: ${why}`;
     case "off":
-      return `${isolated(sender)} took the baton of ${isolated(was)} away: it has none any more`;
+      return `${isolated(sender)} switched the baton off, which ${isolated(was)} held`;
     default:
       return `${isolated(to)} took the baton`;
   }

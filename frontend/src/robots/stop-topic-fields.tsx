@@ -56,7 +56,7 @@ export function StopTopicFields({ stop, onChange }: Props) {
             />
             <NumberInput
               size="xs"
-              label="A message is too old after (s)"
+              label="Longest age of a message (s)"
               min={0.1}
               max={3600}
               value={stop.age_s}

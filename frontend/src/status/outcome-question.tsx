@@ -74,7 +74,7 @@ function OutcomeForm({ run, action }: { run: Run; action: string }) {
         name={
           ready
             ? `Say that ${words} ended ${outcome}`
-            : `Choose the outcome of ${words} and say what you saw first`
+            : `First choose the outcome of ${words}, and say what you saw`
         }
         question={`Did ${words} end ${outcome}? ${then}`}
         disabled={!ready || give.isPending || now.link !== "live"}

@@ -20,7 +20,7 @@ test("what is away is named: the network, the server, its proxy, what it stores 
   const link = { state: "offline", unsaved: 2, kept: true, seq: 3 } as const;
   const waits = "2 changes wait on this device and survive closing the page.";
   expect(unsavedReason({ ...link, why: "no-network" })).toBe(
-    `This device has no network. ${waits} Sent when there is one.`,
+    `This device has no network. ${waits} Sent when the network is back.`,
   );
   expect(unsavedReason({ ...link, why: "proxy", said: "The proxy answers 502." })).toBe(
     `The proxy answers 502. ${waits} Sent when the server answers again.`,

@@ -62,7 +62,9 @@ function awaySentence({ why, said }: RoomLink): string {
 
 function sentWhen(why: RefusalReason | undefined): string {
   if (why === "not-stored") return "Sent when it can store again.";
-  return why === "no-network" ? "Sent when there is one." : "Sent when the server answers again.";
+  return why === "no-network"
+    ? "Sent when the network is back."
+    : "Sent when the server answers again.";
 }
 
 function where(link: RoomLink): string {

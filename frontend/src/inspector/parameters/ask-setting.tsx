@@ -24,7 +24,7 @@ export function AskSetting({ action, parameter }: Props) {
   const set = (next: Bounds | null) => setAsk(doc, action.key, path, next);
   const description =
     bounds !== null && !isAsked
-      ? "Arrows bring it each time, so no start asks for it"
+      ? "Arrows bring the value each time, so no start asks for it"
       : value !== null
         ? "Whoever starts the graph can give another value than this one"
         : required

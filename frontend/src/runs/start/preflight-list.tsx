@@ -241,7 +241,7 @@ interface WriteButtonProps {
 /** The button; where it would replace files it is held, or asks. */
 function WriteButton({ folder, robot, busy, onWrite }: WriteButtonProps) {
   const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
-  const label = `Write them where ${isolated(robot)} looks them up`;
+  const label = `Write the graphs where ${isolated(robot)} looks them up`;
   const icon = <IconFilePencil size={14} aria-hidden />;
   if (replaced.length === 0)
     return (
