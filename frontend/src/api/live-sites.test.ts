@@ -1,6 +1,7 @@
 /** The live sockets of two sites as one: what is unknown at one hides nothing of the other. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Wire } from "../testing/wire";
+import { runnerAt } from "./client";
 import { sessionEnd } from "./http";
 import { LiveSites } from "./live-sites";
 import { openRuns, silentRobots, stateOf, unheardRobots } from "./live-socket";
@@ -30,6 +31,14 @@ const wireOf = (url: string): Wire => {
 let posted: string[];
 /** URLs that do not answer. */
 let silent: string[];
+/** What a URL answers. */
+let answers: Map<string, object>;
+const NONE = {
+  status: 404,
+  type: "not_found",
+  title: "Not found",
+  detail: "There is no such run.",
+};
 let live: LiveSites;
 
 beforeEach(() => {
@@ -37,11 +46,14 @@ beforeEach(() => {
   Wire.all = [];
   posted = [];
   silent = [];
+  answers = new Map();
   vi.stubGlobal("WebSocket", Wire);
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     if (init.method === "POST") posted.push(url);
     if (silent.some((each) => url.startsWith(each))) throw new TypeError("no answer");
-    return Response.json({});
+    const found = answers.get(url);
+    if (found !== undefined) return Response.json(found, { status: 201 });
+    return url.startsWith(`${A.url}/api/runs/new/`) ? Response.json(NONE, NONE) : Response.json({});
   });
   live = new LiveSites([A, B]);
   live.open();
@@ -125,6 +137,56 @@ test("a Stop of a run goes to its site, of an unknown one to all", () => {
   posted = [];
   live.stop("nobody-knows");
   expect(posted).toHaveLength(2);
+});
+
+/** Starts a run at the second site, whose answer is there before the news over its live socket. */
+async function startAtB(): Promise<void> {
+  answers.set(`${B.url}/api/runs`, run("new", "Dora", 3, { group: "both" }));
+  const body = { engine: "Dora", request_id: "x" } as never;
+  live.learn(await runnerAt(A.url).post("/api/runs", { body }));
+  posted = [];
+}
+
+test("a run that was just started belongs to the site that answered, and its Stop goes there", async () => {
+  await startAtB();
+  live.stop("new");
+  live.stop("both");
+  expect(posted).toEqual([`${B.url}/api/runs/new/stop`, `${B.url}/api/runs/both/stop`]);
+  const path = { run: "new" };
+  await runnerAt(A.url).post("/api/runs/{run}/pause", { path });
+  expect(posted.at(-1)).toBe(`${B.url}/api/runs/new/pause`);
+});
+
+test("a run that was started while the live socket of its site is down is unknown, and stopped there", async () => {
+  wireOf(B.url).close(1006);
+  await startAtB();
+  expect(live.state.runs.get("new")?.state).toBe("unknown");
+  live.stop("new");
+  expect(posted).toEqual([`${B.url}/api/runs/new/stop`]);
+});
+
+test("a start that is found at a site belongs to it, also if its answer got lost", async () => {
+  const found = { under_way: false, queued: null };
+  answers.set(`${A.url}/api/starts/x`, { ...found, runs: [] });
+  answers.set(`${B.url}/api/starts/x`, { ...found, runs: [run("new", "Dora", 3)] });
+  const path = { request_id: "x" };
+  const { runs } = await runnerAt(A.url).get("/api/starts/{request_id}", { path });
+  for (const each of runs) live.learn(each);
+  live.stop("new");
+  expect(posted).toEqual([`${B.url}/api/runs/new/stop`]);
+});
+
+test("Stop of a run of an unknown site goes to each, and is not refused while one has not answered", async () => {
+  live.learn(run("new", "Dora", 3) as never);
+  silent = [B.url];
+  live.stop("new");
+  expect(posted).toEqual([`${A.url}/api/runs/new/stop`, `${B.url}/api/runs/new/stop`]);
+  await vi.advanceTimersByTimeAsync(500);
+  expect(live.state.stops.map(({ state }) => state)).toEqual(["unheard"]);
+  silent = [];
+  await vi.advanceTimersByTimeAsync(1_100);
+  expect(posted.slice(2)).toEqual([`${B.url}/api/runs/new/stop`]);
+  expect(live.state.stops.map(({ state }) => state)).toEqual(["heard"]);
 });
 
 test("what one site says wrongly keeps no Stop from the other, and is not known any more", () => {

@@ -94,7 +94,7 @@ export class LiveSites implements Live {
   }
 
   learn(run: Run): void {
-    (this.#partOf(siteOfId(run.id)) ?? this.#parts[0])?.socket.learn(run);
+    this.#partOf(siteOfId(run.id))?.socket.learn(run); // of an unknown site it stays unknown to all
   }
 
   #partOf(site: Site | undefined): Part | undefined {
@@ -190,11 +190,10 @@ const FARNESS = ["refused", "unheard", "asked", "heard"] as const;
 
 function joinedStop(parts: readonly { name: string; stop: StopRequest }[]): StopRequest {
   const stops = parts.map(({ stop }) => stop);
-  // A run is at one site: the others refuse a Stop of it.
-  const counted =
-    stops[0]?.run !== "all" && stops.some(({ state }) => state === "heard")
-      ? stops.filter(({ state }) => state === "heard")
-      : stops;
+  // A run is at one site: the others refuse a Stop of it, which says nothing of a site that is still asked.
+  const may = stops.filter(({ state }) => stops[0]?.run === "all" || state !== "refused");
+  const has = may.filter(({ state }) => stops[0]?.run !== "all" && state === "heard");
+  const counted = [has, may].find((each) => each.length > 0) ?? stops;
   const worst = FARNESS.flatMap((state) => counted.filter((stop) => stop.state === state))[0];
   if (worst === undefined) throw new Error("A Stop of no site.");
   const proven = counted.map(({ provenAt }) => provenAt ?? Number.NaN);

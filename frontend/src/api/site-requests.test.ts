@@ -88,7 +88,7 @@ test("a robot that nobody knows is not started while a site has not said its rob
 });
 
 test("what concerns a run goes to its site, and an unknown one is looked for", async () => {
-  answers = { "GET 8011/api/runs/else": { id: "else" }, "POST 8011": { id: "else" } };
+  answers = { "GET 8011/api/runs/else": { id: "else" }, "POST 8011": {} };
   await runner.post("/api/runs/{run}/pause", { path: { run: "ofB" } });
   await runner.get("/api/runs/{run}", { path: { run: "else" } });
   await runner.post("/api/runs/{run}/pause", { path: { run: "else" } });

@@ -60,15 +60,31 @@ const askSites: SiteRouter["ask"] = async (route, sent, ask) => {
   if (route === "get /api/runs") return listRuns(sent, ask);
   if (JOINED.has(route)) return joined(await answersOf(ask));
   if (route === "get /api/starts/{request_id}")
-    return foundStart(String(sent.path?.request_id), ask);
+    return foundStart(String(sent.path?.request_id), askNoting(ask));
   if (route === "post /api/preflight" && !isLed(sent.body)) return preflights(sent.body, ask);
-  if (OF_ROBOTS.has(route)) return ask(siteOfStart(sent.body));
+  if (OF_ROBOTS.has(route)) return askNoting(ask)(siteOfStart(sent.body));
   const { name, ...ids } = { ...sent.path };
   if (name !== undefined && / \/api\/(queue\/)?robots\//.test(route))
     return ask(siteOf([String(name)]));
   const id = ids.run ?? Object.values(ids)[0] ?? name ?? runIn(sent);
-  return id === undefined ? ask(first()) : ofId(String(id), ask);
+  return id === undefined ? ask(first()) : ofId(String(id), askNoting(ask));
 };
+
+/** The site that answers has the runs of its answer, also where its live socket is late or does not open. */
+function askNoting(ask: AskSite): AskSite {
+  return async (site, other) => {
+    const answer = await ask(site, other);
+    noteRuns(answer, site);
+    return answer;
+  };
+}
+
+function noteRuns(answer: unknown, site: Site): void {
+  if (!isObject(answer)) return;
+  const { id, group, runs, others } = answer;
+  for (const each of [id, group]) if (typeof each === "string") noteSite(each, site);
+  for (const run of [runs, others].flat()) noteRuns(run, site);
+}
 
 /** Return the run that a query or body names. */
 function runIn({ query, body }: UnsentRequest): unknown {
