@@ -26,8 +26,6 @@ export interface StopRequest {
    * that the runner has stopped since.
    */
   runs: readonly string[];
-  /** Set if the runs are all that "all" is about, so that it can be narrowed to them. */
-  whole?: boolean;
   /**
    * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
    * `heard`: the runner is stopping; `refused`: it will not.
@@ -73,8 +71,6 @@ const AGAIN = 1_000; // ms between two tries to send a Stop
 const SOON = 5_000; // ms; the longest wait for another try to reach the runner
 const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
 const TOGETHER = 100; // ms in which news of runs are told together, unless they are urgent
-const FRESH = 1_500; // ms since a message within which the page has seen what goes on
-const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
 export class LiveSocket {
@@ -104,8 +100,6 @@ export class LiveSocket {
   /** News of runs that listeners are told of soon. */
   #untold: ReturnType<typeof setTimeout> | undefined;
   #toldAt = 0; // tick
-  /** The tick of the last message. */
-  #heardAt = 0;
   /** Reason why the last socket did not open. */
   #unreached: UnreachableReason | null = null;
 
@@ -155,37 +149,21 @@ export class LiveSocket {
   stop(run: string | "all", id: string = newAid()): void {
     const first = this.#sendStop(run, id); // before all else: nothing that fails here keeps it back
     const runs = run === "all" ? openRuns(this.state).map((each) => each.id) : [];
-    const whole = this.#isWhole(runs);
-    const stop: StopRequest = { id, run, at: tick(), runs, whole, state: "asked", detail: "" };
+    const stop: StopRequest = { id, run, at: tick(), runs, state: "asked", detail: "" };
     void this.#keepStopping(stop, first);
     this.#putStop(stop);
   }
 
-  /**
-   * Return whether these are all runs that could be seen to move when a person asked to stop all. What
-   * began while the runner was not heard is seen by nobody here.
-   */
-  #isWhole(runs: readonly string[]): boolean {
-    const seen = this.state.link === "live" && tick() - this.#heardAt < FRESH;
-    return seen && runs.length > 0 && foreignGraphs(this.state).length === 0;
-  }
-
-  async #keepStopping(
-    { id, run, at, runs, whole }: StopRequest,
-    first: Promise<unknown>,
-  ): Promise<void> {
-    for (let sent = [first]; ; ) {
-      const errors = (await Promise.allSettled(sent)).flatMap((each) =>
-        each.status === "rejected" ? [each.reason as unknown] : [],
+  /** "all" is sent as such until it is heard: a run may have begun before it that this page has not seen. */
+  async #keepStopping({ id, run }: StopRequest, first: Promise<unknown>): Promise<void> {
+    for (let sent = first; ; sent = this.#sendStop(run, id)) {
+      await sent.then(
+        () => this.#answerStop(id, "heard", ""),
+        (error) => this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error)),
       );
-      const [error] = [...errors.filter((each) => !isFinal(each)), ...errors];
-      if (error === undefined) this.#answerStop(id, "heard", "");
-      else this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error));
       const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
       await new Promise((done) => setTimeout(done, AGAIN));
-      const late = run === "all" && whole && tick() - at > ALL_HOLDS;
-      sent = (late ? runs : [run]).map((each) => this.#sendStop(each, id));
     }
   }
 
@@ -238,7 +216,6 @@ export class LiveSocket {
       this.#expect(socket);
       try {
         this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
-        this.#heardAt = tick();
       } catch (error) {
         // What goes on there is not known any more, until a whole account of it comes.
         console.error("A message of the runner cannot be read:", error, event.data);
@@ -388,7 +365,7 @@ export class LiveSocket {
     const stops = this.state.stops.map((stop) => {
       if (stop.id !== id || stop.state === "heard") return stop;
       // What began until it was heard is stopped by it as well.
-      const late = heard && stop.run === "all" && !stop.whole && tick() - stop.at > AGAIN;
+      const late = heard && stop.run === "all" && tick() - stop.at > AGAIN;
       const more = late ? openRuns(this.state).map((run) => run.id) : [];
       return { ...stop, state, detail, ...heard, runs: [...new Set([...stop.runs, ...more])] };
     });
