@@ -345,6 +345,62 @@ test("a run that ended while the link was down is asked for", async () => {
   live.close();
 });
 
+/** The link breaks, and the runner that is there again does not name its run any more. */
+async function endedUnseen(live: LiveSocket, ...others: object[]): Promise<void> {
+  newest().close(1006);
+  await vi.advanceTimersByTimeAsync(400);
+  newest().say({ type: "hello", engines: [], runs: others });
+  expect(live.state.link).toBe("live");
+  await vi.advanceTimersByTimeAsync(100);
+}
+
+test("a Stop is not proven by a runner that does not name a run whose end is not known", async () => {
+  const group = { ...run("running"), group: "both" };
+  const q = { ...group, id: "q", number: 2 };
+  for (const what of ["all", "r", "both"]) {
+    answering({ stop: 202 });
+    const live = opened(group, q);
+    live.stop(what);
+    await vi.advanceTimersByTimeAsync(10);
+    await endedUnseen(live, { ...q, state: "stopped", ended_at: "2026-01-01T00:00:00Z" });
+    expect(live.state.stops[0]).toMatchObject({ state: "heard" });
+    expect(live.state.stops[0]?.provenAt).toBeUndefined();
+    expect(live.state.runs.get("r")).toMatchObject({ state: "unknown", ended_at: null });
+    answering({ "/api/runs/r": [200, { ...group, ...run("stopped", "2026-01-01T00:00:00Z") }] });
+    for (let at = 0; at < 3; at += 1) {
+      await vi.advanceTimersByTimeAsync(2_000);
+      newest().say({ type: "beat", at: "" });
+    }
+    expect(live.state.runs.get("r")?.state).toBe("stopped");
+    expect(live.state.stops[0]?.provenAt).toBeDefined();
+    live.close();
+  }
+});
+
+test("a Stop is not proven either where the runner does not know the run any more", async () => {
+  answering({ stop: 202, "/api/runs/r": [404, { type: "not_found" }] });
+  const live = opened(run("running"));
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  await endedUnseen(live);
+  expect(live.state.runs.has("r")).toBe(false);
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  live.close();
+});
+
+test("a late answer about the end of a run hides nothing that was said of it since", async () => {
+  const live = opened(run("running"));
+  let answer: (response: Response) => void = () => undefined;
+  vi.stubGlobal("fetch", () => new Promise<Response>((done) => (answer = done)));
+  await endedUnseen(live);
+  const moves = { ...run("running"), moves_again_at: "2026-01-01T00:00:05Z" };
+  newest().say({ type: "run", run: moves });
+  answer(Response.json(run("stopped", "2026-01-01T00:00:00Z")));
+  await vi.advanceTimersByTimeAsync(100);
+  expect(live.state.runs.get("r")).toMatchObject({ state: "running", ended_at: null });
+  live.close();
+});
+
 test("a run that is told as it was draws nothing, and how it stands is told at once", () => {
   const live = new LiveSocket("http://h:1");
   live.open();

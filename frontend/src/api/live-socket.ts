@@ -1,5 +1,5 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
-import { hearStamp, tick } from "../clock/server-clock";
+import { hearStamp, serverNow, tick } from "../clock/server-clock";
 import { isEqual, newAid } from "../graph/stop-basics";
 import { runnerOnlyAt } from "./client";
 import type { AskedConfirmation } from "./confirmations";
@@ -22,7 +22,7 @@ export interface StopRequest {
   /** The tick at which it was asked. */
   at: number;
   /**
-   * The runs that "all" is about: those that this page knew to go on when it was asked, and those
+   * The runs that it is about: those that this page knew to go on when it was asked, and of "all" those
    * that the runner has stopped since.
    */
   runs: readonly string[];
@@ -148,7 +148,8 @@ export class LiveSocket {
    */
   stop(run: string | "all", id: string = newAid()): void {
     const first = this.#sendStop(run, id); // before all else: nothing that fails here keeps it back
-    const runs = run === "all" ? openRuns(this.state).map((each) => each.id) : [];
+    const meant = openRuns(this.state).filter((each) => isMeant(each, run));
+    const runs = meant.map((each) => each.id);
     const stop: StopRequest = { id, run, at: tick(), runs, state: "asked", detail: "" };
     void this.#keepStopping(stop, first);
     this.#putStop(stop);
@@ -285,14 +286,10 @@ export class LiveSocket {
         const runs = new Map(this.state.runs);
         const open = new Set(message.runs.map((run) => run.id));
         // What this page believed to be open and the runner no longer names has ended unseen.
-        for (const [id, run] of runs) {
-          if (open.has(id) || run.ended_at !== null) continue;
-          runs.delete(id);
-          runnerOnlyAt(this.#runner)
-            .get("/api/runs/{run}", { path: { run: id } })
-            .then((ended) => this.#hear({ type: "run", run: ended }))
-            .catch((error: Error) => console.warn("A run's end is not known", id, error.message));
-        }
+        const unseen = openRuns(this.state)
+          .filter(({ id }) => !open.has(id))
+          .map(withUnseenEnd);
+        for (const run of unseen) runs.set(run.id, run);
         for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
         this.#joinStops(message.runs);
         this.#set({
@@ -303,6 +300,7 @@ export class LiveSocket {
           runs,
           queue: undefined, // it is said anew if something waits
         });
+        for (const run of unseen) void this.#askEnd(run);
         break;
       }
       case "run":
@@ -336,6 +334,27 @@ export class LiveSocket {
         tellEach(this.#seers);
         break;
       }
+    }
+  }
+
+  /** Asks how a run has ended until it is known, or the runner says something newer of the run. */
+  async #askEnd(run: Run): Promise<void> {
+    const { id } = run;
+    const isAsked = () => !this.#closed && this.state.runs.get(id) === run;
+    while (isAsked()) {
+      try {
+        const path = { run: id };
+        const ended = await runnerOnlyAt(this.#runner).get("/api/runs/{run}", { path });
+        if (isAsked()) this.#putRun(ended);
+        return;
+      } catch (error) {
+        console.warn("A run's end is not known", id, errorText(error));
+        if (isFinal(error) && isAsked()) {
+          const others = [...this.state.runs].filter(([other]) => other !== id);
+          this.#set({ runs: new Map(others) });
+        }
+      }
+      await new Promise((done) => setTimeout(done, SOON));
     }
   }
 
@@ -421,6 +440,12 @@ export function tellEach(listeners: Iterable<() => void>): void {
       console.error("News of a runner are not shown:", error);
     }
   }
+}
+
+/** Return a run whose end nobody has seen yet, as it is shown until the runner says how it ended. */
+function withUnseenEnd(run: Run): Run {
+  const now = new Date(serverNow()).toISOString();
+  return { ...run, state: "unknown", unknown_since: run.unknown_since ?? now };
 }
 
 /** Throws an error if a message lacks what each robot and each run has. */
@@ -564,11 +589,16 @@ export function silentRobots(now: LiveState): ReadonlySet<string> {
   return new Set(silent.map(({ name }) => name));
 }
 
+/** Return whether a Stop of `what`, a run, a group or all, means a run. */
+function isMeant(run: Run, what: StopRequest["run"]): boolean {
+  return what === "all" || run.id === what || run.group === what;
+}
+
 /** The runs that a Stop is about, as far as this page knows them. */
 export function stopTargets(stop: StopRequest, now: LiveState): Run[] {
   const all = stop.run === "all";
   return [...now.runs.values()].filter((run) =>
-    all ? stop.runs.includes(run.id) : [run.id, run.group].includes(stop.run),
+    all ? stop.runs.includes(run.id) : isMeant(run, stop.run),
   );
 }
 
@@ -576,6 +606,7 @@ export function stopTargets(stop: StopRequest, now: LiveState): Run[] {
 function isProven(stop: StopRequest, now: LiveState): boolean {
   if (now.link !== "live" || stop.state !== "heard") return false;
   const runs = stopTargets(stop, now);
+  if (!stop.runs.every((id) => now.runs.has(id))) return false;
   if (runs.some((run) => run.ended_at === null || run.state === "lost")) return false;
   if (stop.run !== "all") return runs.length > 0;
   return foreignGraphs(now).length === 0 && unheardRobots(now).length === 0;

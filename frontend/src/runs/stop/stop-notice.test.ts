@@ -57,8 +57,16 @@ test("a Stop of everything says of its own runs what became of them, whatever th
   expect(noticeOf(before, lost, 2500)?.text).toBe("The runner says that nothing runs.");
 });
 
+test("a run that the runner does not know any more is not said to be stopped", () => {
+  const all = { ...stop, run: "all", runs: ["r", "gone"] } as const;
+  const ended = now({ state: "stopped", ended_at: "1970-01-01T00:00:02Z" });
+  expect(noticeOf(all, ended, 2500)).toMatchObject({ tone: "loud" });
+  expect(noticeOf({ ...all, provenAt: 2000 }, ended, 2500)).toMatchObject({ tone: "done" });
+});
+
 test("a run that is started after a Stop of everything is not said to be stopping", () => {
-  const all = { ...stop, run: "all", runs: ["gone"] } as const;
+  const all = { ...stop, run: "all", runs: [] } as const;
+  expect(noticeOf(all, now({ state: "running" }), 2_500)).toBeNull();
   expect(noticeOf(all, now({ state: "running" }), 60_000)).toBeNull();
 });
 

@@ -96,6 +96,11 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
       .join(" ");
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
+  if (!down && stop.provenAt === undefined && stop.runs.some((id) => !now.runs.has(id))) {
+    const text =
+      "STOP UNCONFIRMED: the runner does not say how a run ended that was to be stopped. Look at the robot.";
+    return { tone: "loud", text };
+  }
   const foreign = stop.run === "all" && !down ? foreignNotice(now, since) : null;
   if (foreign !== null) return foreign;
   if (at - (stop.provenAt ?? stop.at) > GONE) return null;
