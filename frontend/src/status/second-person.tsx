@@ -216,10 +216,31 @@ export function WantedYes({ graph, looks }: WantedProps) {
   const others = (wanted.data ?? []).filter(
     ({ author, digest }) => author.id !== person.id && !own.has(digest),
   );
-  const each = [...new Map(others.map((question) => [question.digest, question])).values()];
-  return each.map((question) => (
-    <Wanted key={question.digest} graph={graph} question={question} me={person.id} />
-  ));
+  const each = [...new Map(others.map((question) => [questionKey(question), question])).values()];
+  return each.map((question) =>
+    question.hidden ? (
+      <HiddenQuestion key={questionKey(question)} question={question} why={question.hidden} />
+    ) : (
+      <Wanted key={question.digest} graph={graph} question={question} me={person.id} />
+    ),
+  );
+}
+
+/** Return the order of a question; of one with a graph out of sight nothing but who asks, and when, is known. */
+const questionKey = ({ digest, author, at }: ApprovalWanted): string =>
+  digest === "" ? `${author.id} ${at}` : digest;
+
+/** Says that somebody asks for a yes that this person cannot give, and why. */
+function HiddenQuestion({ question, why }: { question: ApprovalWanted; why: string }) {
+  const { author, robots } = question;
+  const who = author.name || "Somebody";
+  return (
+    <section className={style.second} aria-label={`${isolated(who)} asks for a second person`}>
+      <Text size="sm">
+        {isolated(who)} asks others for their yes, for {robots.map(isolated).join(", ")}. {why}
+      </Text>
+    </section>
+  );
 }
 
 function Wanted(props: { graph: string; question: ApprovalWanted; me: string }) {

@@ -70,8 +70,11 @@ def _digest_in(asked: "Sequence[dict[str, Any]]", prefix: str, trees: "Collectio
 
 def _print(question: "dict[str, Any]") -> None:
     who, robots = question["author"]["name"] or "somebody", ", ".join(question["robots"])
-    print(one_line(f"{question['digest'][:_SHOWN]}  {who} asks for {robots}  {question['at']}"))
+    digest = question["digest"][:_SHOWN] or "-"
+    print(one_line(f"{digest}  {who} asks for {robots}  {question['at']}"))
     for line in question["order"]:
         print(one_line(f"  {line['what']}: {line['text']}"))
-    if not question["order"]:
+    if question.get("hidden"):
+        print(one_line(f"  {question['hidden']}"))
+    elif not question["order"]:
         print("  What is asked is not known in words: look at the start yourself.")

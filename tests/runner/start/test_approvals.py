@@ -6,6 +6,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import anyio
 import httpx
 import msgspec
 import pytest
@@ -23,7 +24,7 @@ from action_assistant.runner.start.approvals import (
     ApprovalRequest,
     Approvals,
 )
-from action_assistant.runner.start.orders import order_of
+from action_assistant.runner.start.orders import ordered
 from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.facts import BadProfile, facts_of
@@ -115,8 +116,10 @@ def test_a_yes_is_to_the_whole_order_of_a_led_run(change: dict[str, Any]) -> Non
         "breakpoints": (Breakpoint(action="Work_1"),),
     }
     one, other = order(graph, **whole), order(graph, **(whole | change))
-    assert order_of(one, one.digest, (), {}) != order_of(other, one.digest, (), {})
-    assert order_of(one, one.digest, (), {}) == order_of(order(graph, **whole), one.digest, (), {})
+    first, changed, again = (
+        ordered(each, one.digest, (), {}).digest for each in (one, other, order(graph, **whole))
+    )
+    assert changed != first == again
 
 
 @virtual
@@ -351,3 +354,32 @@ async def test_a_yes_counts_only_while_its_person_may_still_give_it() -> None:
         roles["ben"] = "operator"
         assert (await control.start(start, ANN)).fresh
         control.stop_all(ANN)
+
+
+@virtual
+async def test_a_yes_that_counts_no_more_when_the_message_leaves_lets_nothing_leave() -> None:
+    for is_led in (False, True):
+        david, harness, roles = Open(NEVER), Harness(), dict[str, Role]()
+
+        def now(identity: Identity, roles: dict[str, Role] = roles) -> Identity:
+            role = roles.get(identity.person.id, identity.person.role)
+            person = msgspec.structs.replace(identity.person, role=role)
+            return msgspec.structs.replace(identity, person=person)
+
+        async with careful(harness, david, now) as control:
+            demanding = control.robots.registration("David")
+            await control.register(msgspec.structs.replace(demanding, led=True), ANN)
+            cast = {"engine": "conducted", "robots": {"": "David"}}
+            start = order(sequence(), **(cast if is_led else {"engine": "David"}))
+            await control.approvals.give(yes(ordered(start, start.digest, (), {}).digest), BEN)
+            harness.journal.slow = 1.0
+            async with anyio.create_task_group() as tasks:
+                tasks.start_soon(control.start, start, ANN)
+                await anyio.sleep(0.7)  # accepted, and being stored
+                roles["ben"] = "viewer"
+            harness.journal.slow = 0.0
+            await until(lambda: not control.open)
+            (run,) = [name for name in harness.journal.streams if name.startswith("run/")]
+            ended = harness.journal.history(run.removeprefix("run/"))
+            assert (ended.state, david.starts) == ("refused", [])
+            assert "Ben, who did, may not say so any more" in ended.detail

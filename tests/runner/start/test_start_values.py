@@ -14,7 +14,7 @@ from action_assistant.runner.robots.rights import Rules
 from action_assistant.runner.runs.views import hidden, run_view
 from action_assistant.runner.start.admission import GroupRequest
 from action_assistant.runner.start.approvals import ApprovalRequest
-from action_assistant.runner.start.orders import order_of
+from action_assistant.runner.start.orders import ordered
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.limits import Limit
@@ -194,7 +194,7 @@ def test_two_orders_have_one_digest_exactly_if_they_order_the_same(
 
     def made(parts: dict[str, Any], codes: frozenset[str], limits: tuple[Limit, ...]) -> str:
         named = {"David": limits} if limits else {}
-        return order_of(order(sequence(), **parts), "tree", codes, named)
+        return ordered(order(sequence(), **parts), "tree", codes, named).digest
 
     is_same = meant(one, codes, limit) == meant(other, others, bound)
     assert (made(one, codes, limit) == made(other, others, bound)) == is_same

@@ -195,6 +195,7 @@ export interface RunnerApi {
      * @description A person's question for the yes of others to a start: `digest` is that of its whole order, and
      *     `order` says all of it in words, by a look of the runner (nothing where that is not known);
      *     `values` are those that it gives the graph, `tree_digest` is that of its version, "" if not known.
+     *     `hidden`: why the reader sees no more than who asks and for which robots, "" if they see all of it.
      */
     ApprovalWanted: {
         digest: string;
@@ -210,6 +211,7 @@ export interface RunnerApi {
         };
         order: RunnerApi["OrderLine"][];
         tree_digest: string;
+        hidden: string;
     };
     /**
      * ArchiveRequest

@@ -14,7 +14,10 @@ from action_assistant.runner.api.run_guard import unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.sight import Unseen
 from action_assistant.runner.start.approvals import (
+    HIDDEN_ORDER,
+    ApprovalAsked,
     ApprovalGiven,
     ApprovalQuestion,
     ApprovalRequest,
@@ -40,7 +43,8 @@ class Approval(msgspec.Struct, frozen=True, kw_only=True):
 class ApprovalWanted(msgspec.Struct, frozen=True, kw_only=True):
     """A person's question for the yes of others to a start: `digest` is that of its whole order, and
     `order` says all of it in words, by a look of the runner (nothing where that is not known);
-    `values` are those that it gives the graph, `tree_digest` is that of its version, "" if not known."""
+    `values` are those that it gives the graph, `tree_digest` is that of its version, "" if not known.
+    `hidden`: why the reader sees no more than who asks and for which robots, "" if they see all of it."""
 
     digest: str
     author: Author
@@ -50,6 +54,7 @@ class ApprovalWanted(msgspec.Struct, frozen=True, kw_only=True):
     values: StartValues
     order: tuple[OrderLine, ...]
     tree_digest: str
+    hidden: str = ""
 
 
 class AskedOthers(msgspec.Struct, frozen=True):
@@ -70,7 +75,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         "That of a repeat, or of a turn in the queue, comes with its own `look`.",
         guards=[Needs("see")],
     )
-    async def approvals(
+    async def given_for(
         request: _Asking,
         digest: Annotated[str, Parameter(min_length=64, max_length=64)],
     ) -> list[Approval]:
@@ -91,12 +96,12 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[PersonOnly(), Needs("operate")],
     )
     async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
-        services.control.sight.require_graphs(identity_of(request), data.graph)
+        me, approvals = identity_of(request), services.control.approvals
+        services.control.sight.require_graphs(me, data.graph)
+        await approvals.require_seen(data.digest, data.graph, me)
         session = session_of(request)
         is_named = session is None or session.personal
-        return _approval(
-            await services.control.approvals.give(data, author_of(request), is_named=is_named)
-        )
+        return _approval(await approvals.give(data, author_of(request), is_named=is_named))
 
     @post(
         "/api/approvals/asked",
@@ -123,21 +128,36 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     ) -> list[ApprovalWanted]:
         services.control.sight.require_graphs(identity_of(request), graph)
         found = await services.control.approvals.questions_of(graph)
-        return [
-            ApprovalWanted(
-                digest=each.digest,
-                author=each.author,
-                at=views.time(each.at),
-                robots=each.robots,
-                version=each.version,
-                values=each.values,
-                order=each.order,
-                tree_digest=each.tree_digest,
-            )
-            for each in found
-        ]
+        unseen = unseen_by(services, request)
+        return [shown_to(each, unseen) for each in found]
 
-    return [approvals, approve, ask, wanted]
+    return [given_for, approve, ask, wanted]
+
+
+def shown_to(asked: ApprovalAsked, unseen: Unseen | None) -> ApprovalWanted:
+    """Return a question as people see it. `unseen`: the graphs that the reader may not see."""
+    who: dict[str, Any] = {
+        "author": asked.author,
+        "at": views.time(asked.at),
+        "robots": asked.robots,
+    }
+    if unseen is not None and unseen.hides(asked.graphs):
+        blank: dict[str, Any] = {
+            "digest": "",
+            "version": "",
+            "values": {},
+            "order": (),
+            "tree_digest": "",
+        }
+        return ApprovalWanted(**who, **blank, hidden=HIDDEN_ORDER)
+    return ApprovalWanted(
+        **who,
+        digest=asked.digest,
+        version=asked.version,
+        values=asked.values,
+        order=asked.order,
+        tree_digest=asked.tree_digest,
+    )
 
 
 def _approval(given: ApprovalGiven) -> Approval:

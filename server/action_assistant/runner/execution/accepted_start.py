@@ -6,6 +6,7 @@ from action_assistant.runner.links.port import Link, NotSent
 from action_assistant.runner.links.simulator import LeadableLink
 from action_assistant.runner.runs.events import Overridden
 from action_assistant.runner.start.admission import Prepared, PreparedPieces, StartRequest
+from action_assistant.runner.start.approvals import Approved
 from action_assistant.runner.start.orders import overridden_in
 from action_assistant.umrf.breakpoints import Breakpoint
 
@@ -28,7 +29,7 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     the engine process with the id `incarnation`. `doubt`: why its answers prove nothing, as the
     starter has seen it; `despite`: problems that a person overrides; `led`: the further part of a
     led run, else None; `keeps`: the engine has the helper package, so that values can be read
-    from it."""
+    from it; `approved`: the yes by which robots take it."""
 
     request: StartRequest
     prepared: Prepared
@@ -39,6 +40,7 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     despite: tuple[Overridden, ...] = ()
     led: LedStart | None = None
     keeps: bool = False
+    approved: tuple[Approved, ...] = ()
 
     @property
     def overridden(self) -> tuple[str, ...]:

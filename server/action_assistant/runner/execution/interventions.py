@@ -29,8 +29,8 @@ from action_assistant.runner.start.admission import (
     decoded,
     prepared,
 )
-from action_assistant.runner.start.approvals import Approvals
-from action_assistant.runner.start.orders import claim_of, order_of, watched_in
+from action_assistant.runner.start.approvals import Approvals, Approved
+from action_assistant.runner.start.orders import claim_of, ordered, watched_in
 from action_assistant.runner.start.robot_graphs import not_matched_in, unseen_graphs_in
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.limits import Limits
@@ -126,9 +126,11 @@ async def modify(
     ready = await run_in_worker(prepare, start, facts, run.id)
     if sight.has_rules and not run.unsighted:
         _require_own_sight(asked.sight, ready)
+    approved: tuple[Approved, ...] = ()
     if engine is not None:
-        order = order_of(start, ready.digest, (), limits)
-        await approvals.require(engine.registration, [order], author.id)
+        order = ordered(start, ready.digest, (), limits)
+        demand = approvals.demand(order, start, author.id)
+        approved = await approvals.require(engine.registration, demand)
         await _require_matched(engine, ready.umrf, run_in_worker)
         if limits.get(run.engine):
             await _require_held(engine, run, ready.umrf, run_in_worker)
@@ -148,6 +150,7 @@ async def modify(
             require(claim)
         except Refused as why:
             raise NotSent(why.detail) from why
+        approvals.require_still(approved)
 
     try:
         await opened.modify(
@@ -207,6 +210,7 @@ def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
         override=asked.override,
         watching=asked.watching,
         drill=run.drill,
+        sight=asked.sight,
     )
 
 

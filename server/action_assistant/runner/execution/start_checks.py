@@ -43,7 +43,7 @@ from action_assistant.runner.start.admission import (
     prepared,
     prepared_pieces,
 )
-from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.approvals import Approvals, Approved
 from action_assistant.runner.start.casting import require_not_led
 from action_assistant.runner.start.led_items import (
     INDEXING,
@@ -218,7 +218,7 @@ class StartChecks:
         `starter`: the id of the person; `order`: the whole order; `is_led`: it is the part of a led run
         on this robot.
         Raise Unavailable if the robot does not answer, Conflict if a check fails."""
-        await self._check(request, ready, robot, starter, order)
+        approved = await self._check(request, ready, robot, starter, order)
         try:
             view = await self._ask(robot)
         except NoAnswer as nothing:
@@ -226,7 +226,8 @@ class StartChecks:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        return await self._decide(request, ready, robot, view, starter, is_led=is_led)
+        accepted = await self._decide(request, ready, robot, view, starter, is_led=is_led)
+        return msgspec.structs.replace(accepted, approved=approved)
 
     async def _accept_conducted(
         self, request: StartRequest, starter: Identity, often: Often
@@ -269,6 +270,7 @@ class StartChecks:
             despite=_each_once(
                 _overridden(ready.whole, items), *(each.despite for each in accepted)
             ),
+            approved=tuple(yes for each in accepted for yes in each.approved),
             led=LedStart(
                 pieces=ready,
                 lives={each.request.engine: each.incarnation for each in accepted},
@@ -306,13 +308,13 @@ class StartChecks:
         robot: KnownEngine,
         starter: Identity,
         order: Ordered,
-    ) -> None:
-        """Make the checks that need no answer of the engine: the rights of the robot, the yes of a second person, whether a
-        run keeps the robot, and whether anything is being stopped there. `starter`: the person; `order`: the whole order. Raise Conflict or Forbidden if one fails."""
+    ) -> tuple[Approved, ...]:
+        """Make the checks that need no answer of the engine: the rights of the robot, the yes of a second
+        person, which is returned, whether a run keeps the robot, and whether anything is being stopped there.
+        `starter`: the person; `order`: the whole order. Raise Conflict or Forbidden if one fails."""
         self._rights.require([request.engine], starter, claim_of(request, ready))
-        await self._approvals.require(
-            robot.registration, order.approving, starter.person.id, _named(order)
-        )
+        demand = self._approvals.demand(order, request, starter.person.id)
+        approved = await self._approvals.require(robot.registration, demand)
         overridden = overridden_in(request)
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
         if self._foreign_stops.is_stopping(request.engine):
@@ -320,6 +322,7 @@ class StartChecks:
                 f"Something is being stopped on {request.engine}; a start would be stopped with it.",
                 where={"path": "/engine", "item": "quiet"},
             )
+        return approved
 
     async def _ask(self, robot: KnownEngine) -> EngineView:
         """Send a get to the engine, in the same way that would confirm a Stop, after it has read
@@ -398,6 +401,10 @@ class StartChecks:
         name = accepted.prepared.name
         items = [self._free_item(each, name) for each in engines_of(accepted.request)]
         preflight.require_clear(items, accepted.overridden)
+
+    def require_approved(self, accepted: AcceptedStart) -> None:
+        """Raise NotSent unless the yes by which robots take a start still counts. Does not wait."""
+        self._approvals.require_still(accepted.approved)
 
     def why_occupied(self, accepted: AcceptedStart) -> str:
         """Return the sentence that says which run by now keeps a robot from an accepted start; ""
@@ -596,13 +603,12 @@ class StartChecks:
             robots = engines_of(request) if is_led else together or (look.engine,)
             limits = self._rights.limits(robots)
             order = ordered(request, look.tree_digest, codes, limits, often, together)
-            item = robot and await self._approvals.item(
-                robot, order.approving, starter.person.id, _named(order)
-            )
-            if item:
-                lines = self._approvals.remember(order, request.graph)
+            demand = self._approvals.demand(order, request, starter.person.id)
+            looked = robot and await self._approvals.look(robot, demand)
+            if looked:
+                lines = self._approvals.remember(demand, request.graph)
                 look = msgspec.structs.replace(
-                    preflight.with_approval(look, item), order_digest=order.digest, order=lines
+                    preflight.with_approval(look, looked[0]), order_digest=order.digest, order=lines
                 )
             found.append(look)
         return found
@@ -635,13 +641,6 @@ def _code_of(refused: Refused) -> str:
         each["code"] == "subgraph-across" for each in obstacles
     )
     return "subgraph-across" if is_shared else "graph"
-
-
-def _named(order: Ordered) -> str:
-    """Return in words what a second person says yes to."""
-    if "repeat" in order.parts:
-        return "this repeat"
-    return "this start" if order.parts else "this graph"
 
 
 def require_led(robot: KnownEngine) -> None:

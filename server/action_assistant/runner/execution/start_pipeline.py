@@ -207,6 +207,7 @@ class StartPipeline:
                 if why := self._stops.why_refused(stops, *names):
                     raise NotSent(why)
                 self._rights.require_still(robots, starter, claim)
+                self._checks.require_approved(accepted)
                 accepted.require_still()
 
             opened = self._open(accepted, requested, run, starter, may_leave)

@@ -171,14 +171,6 @@ def ordered(
     return Ordered(tree_digest, more)
 
 
-def order_of(
-    request: StartRequest, tree_digest: str, codes: Collection[str], limits: Limits
-) -> str:
-    """Return the digest of the order of a start that is carried out whenever a person starts exactly
-    this."""
-    return ordered(request, tree_digest, codes, limits).digest
-
-
 _Words: TypeAlias = Iterator[tuple[str, str]]
 
 
