@@ -1,5 +1,7 @@
 """Several robots start one version together, or none of them does."""
 
+from typing import Any
+
 import anyio
 import pytest
 
@@ -60,6 +62,29 @@ async def test_a_group_has_robots_only(other: str) -> None:
             await control.start_group(group(sequence(), "David", other), ANN)
     assert refused.value.where == {"path": "/engines"}
     assert david.starts == []
+
+
+@pytest.mark.parametrize(
+    "field",
+    [
+        {"robots": {"Scout": "David"}},
+        {"people": {"guard": ""}},
+        {"levels": "opened"},
+        {"like": "Eve"},
+        {"behaviours": True},
+    ],
+    ids="".join,
+)
+@virtual
+async def test_a_group_takes_nothing_of_a_led_run_and_nothing_of_the_simulator(
+    field: dict[str, Any],
+) -> None:
+    david, eve = Open(NEVER), Open(NEVER)
+    async with fleet(Harness(), David=david, Eve=eve) as control:
+        with pytest.raises(BadInput, match="Only") as refused:
+            await control.start_group(group(sequence(), "David", "Eve", **field), ANN)
+    assert refused.value.where == {"path": f"/{''.join(field)}"}
+    assert (david.starts, eve.starts) == ([], [])
 
 
 @virtual

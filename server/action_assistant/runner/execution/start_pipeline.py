@@ -34,8 +34,15 @@ from action_assistant.runner.runs.events import Author, Led, PartOfRepeat, Reque
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
+from action_assistant.runner.start.casting import require_not_led
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
-from action_assistant.runner.start.orders import Often, claim_of, engines_of, kept_for
+from action_assistant.runner.start.orders import (
+    Often,
+    claim_of,
+    engines_of,
+    kept_for,
+    require_plain,
+)
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.web.auth.identity import Identity
 
@@ -115,7 +122,7 @@ class StartPipeline:
     ) -> Grouped:
         """Start one version on several robots in the name of `author`. All starts are accepted
         before the first message is sent. `often`: as in `start`. Raise BadInput if the group has no request id or names the
-        simulator, another subclass of Refused if one start is refused; nothing was sent to any
+        simulator, or has fields of a led run or of the simulator, another subclass of Refused if one start is refused; nothing was sent to any
         robot then."""
         stops = self._stops.count
         requests = [group.for_engine(engine) for engine in sorted(group.engines)]
@@ -126,6 +133,7 @@ class StartPipeline:
         if not group.request_id or not is_of_robots:
             where = "/engines" if group.request_id else "/request_id"
             raise BadInput("A group has a request_id, and robots only.", where={"path": where})
+        _require_handed_over(group)
         _require_own_id(group.request_id, often)
         async with self._claims.once(group.request_id):
             found = [await self._known(each) for each in requests]
@@ -253,6 +261,15 @@ class StartPipeline:
             except Refused as why:
                 failed[each.request.engine] = why.detail
         return Grouped(group, runs, failed, fresh=True)
+
+
+def _require_handed_over(group: GroupRequest) -> None:
+    """Raise BadInput if a start on several robots, each of which gets the whole graph, has fields that mean
+    something only in a led run or in the simulator, as a start on one of them does."""
+    require_not_led(group.robots, group.people)
+    require_plain(group)
+    if group.levels != "one_step":
+        raise BadInput("Only a led run opens its sub-graphs.", where={"path": "/levels"})
 
 
 def _require_own_id(request_id: str, often: Often) -> None:

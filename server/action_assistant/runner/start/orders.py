@@ -14,7 +14,7 @@ import rfc8785
 from action_assistant.errors import BadInput
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.robots.rights import Claim
-from action_assistant.runner.start.admission import Prepared, StartRequest, Watching
+from action_assistant.runner.start.admission import GroupRequest, Prepared, StartRequest, Watching
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.codes import CODES
@@ -317,7 +317,7 @@ def kept_for(request: StartRequest) -> tuple[str, ...]:
     return (*engines_of(request), *continued)
 
 
-def require_plain(request: StartRequest) -> None:
+def require_plain(request: StartRequest | GroupRequest) -> None:
     """Raise BadInput if a start on a robot has fields that only the simulator understands."""
     if request.like is not None:
         raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
