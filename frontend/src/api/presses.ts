@@ -17,9 +17,12 @@ const KEPT = 30 * 60_000; // ms; the same press later is another one
 /** A request id, and the time of its first press, ms. */
 type Pressed = readonly [request: string, at: number];
 
-function stored(): [string, Pressed][] {
+/** Takes what the page before this one has handed over. A page that lives leaves nothing there to be copied. */
+function taken(): [string, Pressed][] {
   try {
-    return Object.entries(JSON.parse(sessionStorage.getItem(KEY) ?? "{}"));
+    const kept = sessionStorage.getItem(KEY) ?? "{}";
+    sessionStorage.removeItem(KEY);
+    return Object.entries(JSON.parse(kept));
   } catch {
     return []; // a browser may forbid it
   }
@@ -27,12 +30,13 @@ function stored(): [string, Pressed][] {
 
 /**
  * Request ids of presses whose answers got lost, by what was pressed. They live as long as the tab: a press that is
- * made again after the page was loaded anew counts once with the first.
+ * made again after the page was loaded anew counts once with the first. A copy of the tab has none of them: what is
+ * pressed there is another press.
  */
-const lostPresses = new Map(stored());
+const lostPresses = new Map(taken());
 
-/** Keep the lost presses for when the page is loaded anew. */
-function keepLostPresses(): void {
+/** Hands the lost presses over to the page that is loaded next in this tab. */
+function handOver(): void {
   const short = [...lostPresses].filter(([what]) => what.length < LONGEST);
   try {
     sessionStorage.setItem(KEY, JSON.stringify(Object.fromEntries(short)));
@@ -40,6 +44,11 @@ function keepLostPresses(): void {
     // A tab that stores nothing still knows them until it is loaded anew.
   }
 }
+
+globalThis.addEventListener?.("pagehide", handOver);
+globalThis.addEventListener?.("pageshow", ({ persisted }) => {
+  if (persisted) taken(); // this page is there again, and knows them
+});
 
 /**
  * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
@@ -56,7 +65,6 @@ export async function sendPress<T>(
   const lost = known !== undefined && deviceNow() - known[1] < KEPT ? known : undefined;
   const [request, at] = lost ?? [newAid(), deviceNow()];
   lostPresses.set(press, [request, at]);
-  keepLostPresses();
   try {
     const answer = await send(request);
     lostPresses.delete(press);
@@ -65,8 +73,6 @@ export async function sendPress<T>(
     const isOver = lost === undefined || pathRefused(error).endsWith("/request_id");
     if (isOver && !isOutcomeUnknown(error)) lostPresses.delete(press);
     throw error;
-  } finally {
-    keepLostPresses();
   }
 }
 
