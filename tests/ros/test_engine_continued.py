@@ -8,8 +8,10 @@ Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the p
 import os
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import anyio
+import httpx
 import msgspec
 import pytest
 
@@ -22,9 +24,12 @@ from action_assistant.runner.execution.interventions import RestRequest, confirm
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.earlier import Choice, StartFrom
 from action_assistant.runner.start.admission import StartRequest
-from ros.led_engines import Engines, as_led, over, relay
+from action_assistant.runner.start.kept_starts import text_of
+from ros.led_engines import Engines, as_led, over, register, relay
 from ros.led_runner import is_over
+from runner import process
 from runner.harness import ANN, BEN, until
+from support import waiting
 from support.real_engine import needs_engine
 
 DOMAIN = int(os.environ.get("TEST_LED_DOMAIN", "170"))
@@ -157,3 +162,64 @@ def test_a_run_of_a_part_begins_nothing_that_it_skips(
             assert begun(engines) == played
 
     anyio.run(main)
+
+
+def rests(client: httpx.Client, run: str) -> list[dict[str, Any]]:
+    """Return how far each robot of a run is known to be at rest."""
+    found: list[dict[str, Any]] = client.get(f"/api/runs/{run}").json()["rests"]
+    return found
+
+
+def looked_at(client: httpx.Client, run: str) -> bool:
+    """Say of each robot that keeps a run open that somebody has looked; return whether the run is over."""
+    for each in rests(client, run):
+        if each.get("piece"):
+            how = {"how": "I stand beside it."}
+            client.post(
+                f"/api/runs/{each['piece']}/at_rest", json=how
+            )  # refused where it is proven
+    return bool(client.get(f"/api/runs/{run}").json()["ended_at"])
+
+
+def test_after_a_kill_of_everything_a_run_is_continued_and_nothing_begins_twice_unasked(
+    engines: Engines, tmp_path: Path
+) -> None:
+    runner = process.RunnerProcess(tmp_path / "runner").start()
+    try:
+        for name in engines.names:
+            engines.start(name)
+        with runner.client() as client:
+            register(client, engines.names)
+            start = task()
+            run = process.started(client, start)["id"]
+            waiting.until("the third action has not begun", lambda: begun(engines)["OxWork_2"])
+        runner.kill()
+        for name in engines.names:
+            engines.kill(name)
+        for name in engines.names:
+            engines.start(name)
+        runner.start()
+        with runner.client() as client:
+            client.post(f"/api/runs/{run}/stop").raise_for_status()
+            waiting.until(
+                "it is not over", lambda: looked_at(client, run), 60, lambda: rests(client, run)
+            )
+            assert begun(engines) == {"OxWork_0": 1, "OxWork_1": 1, "OxWork_2": 1}
+            unasked = client.post("/api/runs", content=bytes(text_of(on(start, run, "unasked"))))
+            assert unasked.status_code in {400, 409}
+            assert "OxWork_2" in unasked.text
+            asked = bytes(text_of(on(start, run, "again", OxWork_2="again")))
+            refused: list[str] = []
+
+            def continued() -> str:
+                answer = client.post("/api/runs", content=asked)
+                refused.append(answer.text)
+                return str(answer.json()["id"]) if answer.is_success else ""
+
+            again = waiting.until("it is not continued", continued, 60, lambda: refused[-1])
+            assert process.over(client, again)["state"] == "finished"
+            assert client.post("/api/runs", content=asked).json()["id"] == again
+        assert begun(engines) == {"OxWork_0": 1, "OxWork_1": 1, "OxWork_2": 2, "OxWork_3": 1}
+    finally:
+        runner.end()
+        engines.end()
