@@ -117,6 +117,16 @@ PARTS: Final[dict[str, Part]] = {
         {"SOAK_OVERTAKEN": "60", "SOAK_SEEDS": "20"},
         ("tests/journal/test_overtaken.py", "-k", "three_writers"),
     ),
+    "several": Part(
+        "20 times three editors' writers on one Postgres, whose connections are cut",
+        {"SOAK_OVERTAKEN": "60", "SOAK_SEEDS": "20"},
+        ("tests/journal/test_several_writers.py", "-k", "are_cut"),
+    ),
+    "cluster": Part(
+        "100,000 schedules of a model of several editors",
+        {"SOAK_CLUSTER": "100000"},
+        ("tests/editor/cluster/test_model.py",),
+    ),
     "flips": Part(
         "10,000 flipped bytes of a log",
         {"SOAK_FLIPS": "10000"},

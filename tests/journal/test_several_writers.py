@@ -6,16 +6,21 @@ import os
 import random
 from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 from sqlalchemy import Executable
 from sqlalchemy.dialects.postgresql import insert
 
 from action_assistant.errors import CannotStart, Conflict, Unavailable
+from action_assistant.journal.copies.copying import copy
+from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold, nothing
+from action_assistant.journal.heads import head_at
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.slots import Cursor, before_first, slot_of
 from action_assistant.schema import editor_tables
+from action_assistant.web.audit.rows import AuditFilter, Fact, audit_page
 from journal.servers import Server
 
 #: Events that each random writer appends.
@@ -73,7 +78,7 @@ async def test_each_writer_has_a_slot_and_the_only_writer_has_none_beside_it(
     await alone.close()
 
 
-async def test_a_file_has_one_writer(tmp_path: object) -> None:
+async def test_a_file_has_one_writer(tmp_path: Path) -> None:
     with pytest.raises(CannotStart, match="Several editors need a Postgres database"):
         await opened(f"sqlite:///{tmp_path}/editor.db")
 
@@ -93,6 +98,22 @@ async def test_who_owns_a_stream_no_longer_cannot_append_to_it(postgres: Server)
     with pytest.raises(Conflict):
         await one.append_all([late])
     assert [each.body for each in await one.read("graph")] == [b"1", b"2"]
+    assert await one.verify() == []
+    await one.close()
+    await other.close()
+
+
+async def test_who_owned_a_stream_before_and_owns_it_again_goes_on_behind_the_others(
+    postgres: Server,
+) -> None:
+    url = postgres.new_database()
+    one, other = await opened(url), await opened(url)
+    take = "UPDATE head SET epoch = epoch + 1 WHERE stream = 'graph'"
+    await one.append_all([Addition("graph", (draft("1"),), 0, epoch=0)])
+    postgres.sql(take, url.rpartition("/")[2])
+    assert await other.append_all([Addition("graph", (draft("2"),), 1, epoch=1)]) == [2]
+    postgres.sql(take, url.rpartition("/")[2])
+    assert await one.append_all([Addition("graph", (draft("3"),), 2, epoch=2)]) == [3]
     assert await one.verify() == []
     await one.close()
     await other.close()
@@ -231,3 +252,104 @@ async def test_a_reader_gets_each_event_of_all_writers_once_whoever_stored_it_wh
     assert sorted(each.seq for each in seen) == [each.seq for each in await reader.read("people")]
     for writer in writers:
         await writer.close()
+
+
+async def test_whoever_follows_hears_the_events_of_all_writers_in_the_order_of_their_streams(
+    postgres: Server,
+) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url) for _ in range(3)]
+    heard: list[tuple[str, int]] = []
+    async with journals[1].follow() as events:
+        for n in range(30):
+            await journals[n % 3].append(f"s{n % 4}", [draft(str(n))])
+        async with asyncio.timeout(20):
+            while len(heard) < 30:
+                event = await anext(events)
+                heard.append((event.stream, event.seq))
+    for stream in {stream for stream, _ in heard}:
+        seqs = [seq for each, seq in heard if each == stream]
+        assert seqs == list(range(1, len(seqs) + 1))
+    seen, read = Cursor(), list[tuple[str, int]]()
+    while page := await journals[2].read_since(seen, limit=4):
+        for event in page:
+            read.append((event.stream, event.seq))
+            seen = Cursor.parse(str(seen.after(event.position)))
+    assert sorted(read) == sorted(heard)
+    for stream in {stream for stream, _ in read}:
+        assert sorted(read) == sorted(set(read))
+        seqs = [seq for each, seq in read if each == stream]
+        assert seqs == sorted(seqs)
+    assert seen == await journals[0].cursor()
+    assert seen.events == 30
+    for each in journals:
+        await each.close()
+
+
+async def test_the_audit_of_several_writers_is_paged_by_time(postgres: Server) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url) for _ in range(3)]
+    for n in range(25):
+        await journals[n % 3].append(f"s{n % 2}", [draft(str(n))])
+
+    def describe(event: Event) -> Fact:
+        return Fact(kind="other", text=event.body.decode())
+
+    told: list[int] = []
+    before: int | None = None
+    while True:
+        wanted = AuditFilter(before=before, limit=4)
+        page = await journals[0].ask(
+            lambda connection, wanted=wanted: audit_page(
+                connection, "editor", wanted, describe, frozenset()
+            )
+        )
+        told += [int(row.text) for row in page.rows]
+        if page.before is None:
+            break
+        before = page.before
+    assert told == list(range(25))[::-1]
+    for each in journals:
+        await each.close()
+
+
+async def test_the_end_of_the_log_of_several_writers_is_found_again_later(postgres: Server) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url) for _ in range(2)]
+    for n in range(6):
+        await journals[n % 2].append("people", [draft(str(n))])
+    then = await journals[0].cursor()
+    line = await head_at(journals[0], "editor", then, lambda _: [])
+    for n in range(6):
+        await journals[n % 2].append("people", [draft(str(n))])
+    assert await head_at(journals[1], "editor", Cursor.parse(str(then)), lambda _: []) == line
+    now = await journals[0].cursor()
+    assert (await head_at(journals[0], "editor", now, lambda _: [])).digest != line.digest
+    assert now.covers(then)
+    assert not then.covers(now)
+    for each in journals:
+        await each.close()
+
+
+async def test_a_copy_of_a_log_of_several_writers_is_sound(
+    postgres: Server, tmp_path: Path
+) -> None:
+    url = postgres.new_database()
+    journals = [await opened(url, people) for _ in range(3)]
+    dice = random.Random(3)
+    for n in range(40):
+        await dice.choice(journals).append(f"s{dice.randrange(5)}", [draft(str(n))])
+    for each in journals:
+        await each.close()
+    target = f"sqlite:///{tmp_path / 'copy.db'}"
+    back = postgres.new_database()
+    for source, into in ((url, target), (target, back)):
+        copied = await asyncio.to_thread(
+            copy, database_of(source), database_of(into), branch="editor", fold=nothing
+        )
+        assert copied == 40
+        journal = await opened(into, several=False)
+        assert await journal.verify() == []
+        assert await journal.rebuild() == 40
+        assert (await journal.cursor()).events == 40
+        await journal.close()

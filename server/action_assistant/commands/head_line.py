@@ -20,13 +20,14 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey,
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.heads import LogHead
+from action_assistant.journal.slots import Cursor
 
 _MARK: Final = "action-assistant-heads"
 _LINE: Final = re.compile(
-    rf"(?P<signed>{_MARK} 1 (?P<time>\S{{1,40}})(?P<heads>(?: (?:editor|runner) \d{{1,18}} [0-9a-f]{{64}}){{1,2}}))"
+    rf"(?P<signed>{_MARK} 1 (?P<time>\S{{1,40}})(?P<heads>(?: (?:editor|runner) [0-9.]{{1,960}} [0-9a-f]{{64}}){{1,2}}))"
     r"(?: ed25519 (?P<key>[A-Za-z0-9+/]{43}=) (?P<signature>[A-Za-z0-9+/]{86}==))?"
 )
-_HEAD: Final = re.compile(r"(editor|runner) (\d+) ([0-9a-f]{64})")
+_HEAD: Final = re.compile(r"(editor|runner) ([0-9.]+) ([0-9a-f]{64})")
 _NEW_KEY: Final = "openssl genpkey -algorithm ed25519 -out"
 
 
@@ -42,7 +43,7 @@ class HeadLine(msgspec.Struct, frozen=True):
 def written(time: str, heads: Mapping[Branch, LogHead], key: Ed25519PrivateKey | None) -> str:
     """Return the line of `verify --head` for the ends of the logs at this time, signed if there is
     a key."""
-    named = (f"{branch} {head.position} {head.digest}" for branch, head in sorted(heads.items()))
+    named = (f"{branch} {head.cursor} {head.digest}" for branch, head in sorted(heads.items()))
     line = " ".join((_MARK, "1", time, *named))
     if key is None:
         return line
@@ -70,8 +71,11 @@ def read(text: str, key: Ed25519PublicKey | None) -> HeadLine:
         except InvalidSignature as error:
             raise CannotStart("The line is not what was signed: it was altered.") from error
     heads: dict[Branch, LogHead] = {}
-    for branch, position, digest in _HEAD.findall(found["heads"]):
-        heads[branch] = LogHead(int(position), digest)
+    for branch, moment, digest in _HEAD.findall(found["heads"]):
+        try:
+            heads[branch] = LogHead(Cursor.parse(moment), digest)
+        except ValueError as error:
+            raise CannotStart(f"{moment} is no moment of a log.") from error
     return HeadLine(found["time"], heads, found["key"] or "")
 
 

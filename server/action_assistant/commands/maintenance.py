@@ -22,6 +22,7 @@ from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.migrate import recognize, revisions_of
+from action_assistant.journal.slots import Cursor
 from action_assistant.safe_text import told
 from action_assistant.settings import settled
 
@@ -116,16 +117,16 @@ def _verify(options: argparse.Namespace) -> int:
                 "left as they are",
                 makes_line,
             )
-        events = await journal.position()
+        moment = await journal.cursor()
         damages = await journal.verify()
         for damage in damages:
             _say(f"{branch}: {_sentence(damage)}", makes_line)
         if damages or strange[branch]:
             return False
-        _say(f"{branch}: {events} events, all of them sound", makes_line)
+        _say(f"{branch}: {moment.events} events, all of them sound", makes_line)
         if makes_line:
-            now[branch] = await _head(journal, branch, events, data)
-        outcomes = [await _is_as_then(journal, branch, line, events, data) for line in given]
+            now[branch] = await _head(journal, branch, moment, data)
+        outcomes = [await _is_as_then(journal, branch, line, moment, data) for line in given]
         return all(outcomes)
 
     code = for_each(data, journals, look, upgrades=False)
@@ -175,8 +176,8 @@ def _strange(journal: "KnownJournal") -> list[str]:
         return [f"its schema cannot be read: {error}"]
 
 
-async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> heads.LogHead:
-    """Return the end of the log of a branch after the event at `position`, with a digest over the
+async def _head(journal: Journal, branch: Branch, cursor: Cursor, data: Path) -> heads.LogHead:
+    """Return the end of the log of a branch at the moment `cursor`, with a digest over the
     ends of all its streams then, also of archived ones. `data`: the data folder. Raise OSError or
     Refused if an archive cannot be read."""
     from action_assistant.runner.archives import archive_file
@@ -189,37 +190,38 @@ async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> 
             raise OSError(f"{place} leads out of {folder}")
         return archive_file.read(path)
 
-    return await heads.head_at(journal, branch, position, kept)
+    return await heads.head_at(journal, branch, cursor, kept)
 
 
 async def _is_as_then(
-    journal: Journal, branch: Branch, line: "head_line.HeadLine", events: int, data: Path
+    journal: Journal, branch: Branch, line: "head_line.HeadLine", now: Cursor, data: Path
 ) -> bool:
-    """Return whether the log of a branch, which has `events` events now, still begins as a line of
+    """Return whether the log of a branch, which has come to the moment `now`, still begins as a line of
     `verify --head` says, and print the result. `data`: the data folder."""
     then = line.heads.get(branch)
     if then is None:
         print(f"{branch}: the line of {line.time} does not speak of it")
         return True
-    if then.position > events:
+    count = then.cursor.events
+    if not now.covers(then.cursor):
         print(
-            f"{branch}: it had {then.position} events at {line.time}, and has {events}: the others were "
+            f"{branch}: it had {count} events at {line.time}, and has {now.events}: the others were "
             "removed, or an older backup was restored"
         )
         return False
     try:
-        found = await _head(journal, branch, then.position, data)
+        found = await _head(journal, branch, then.cursor, data)
     except (OSError, Refused) as error:
         why = error.detail if isinstance(error, Refused) else str(error)
         print(told(f"{branch}: cannot be compared with the line of {line.time}: {why}"))
         return False
     if found.digest != then.digest:
         print(
-            f"{branch}: is NOT what it was at {line.time}: one of its first {then.position} events was "
+            f"{branch}: is NOT what it was at {line.time}: one of its first {count} events was "
             "altered since, and the chain was made anew"
         )
         return False
-    print(f"{branch}: its first {then.position} events are those of {line.time}")
+    print(f"{branch}: its first {count} events are those of {line.time}")
     return True
 
 

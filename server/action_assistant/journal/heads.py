@@ -17,6 +17,7 @@ from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
 from action_assistant.journal.reader import JournalReader
 from action_assistant.journal.removal import STREAM, StreamRemoved
+from action_assistant.journal.slots import Cursor, is_between, slot_of
 from action_assistant.schema.editor_tables import editor_event
 
 _event: Final = editor_event.c
@@ -26,32 +27,30 @@ ReadKept = Callable[[str], Iterable[Event]]
 
 
 class LogHead(msgspec.Struct, frozen=True):
-    """The end of a log: the position of its last event, and a digest over the ends of all its
+    """The end of a log: the moment after its last event, and a digest over the ends of all its
     streams, in hex."""
 
-    position: int
+    cursor: Cursor
     digest: str
 
 
 async def head_at(
-    journal: JournalReader, branch: Branch, position: int, read_kept: ReadKept
+    journal: JournalReader, branch: Branch, cursor: Cursor, read_kept: ReadKept
 ) -> LogHead:
-    """Return the end of the log of a branch right after the event at `position`, with a digest over
+    """Return the end of the log of a branch at the moment `cursor`, with a digest over
     the last event of each stream at that point. `read_kept` reads the events of streams that have
     been archived in the meantime. Raise OSError or Refused if an archive cannot be read, Conflict if
     a stream that went on then was dropped."""
-    return LogHead(
-        position, digest_of(branch, position, await heads_at(journal, position, read_kept))
-    )
+    return LogHead(cursor, digest_of(branch, cursor, await heads_at(journal, cursor, read_kept)))
 
 
-async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -> dict[str, Head]:
-    """Return the end (number and hash) of each stream as of the event at `position`. `read_kept`:
+async def heads_at(journal: JournalReader, cursor: Cursor, read_kept: ReadKept) -> dict[str, Head]:
+    """Return the end (number and hash) of each stream at the moment `cursor`. `read_kept`:
     reads the events of streams that were removed since. Raise OSError or Refused if one cannot be
     read, Unavailable if the journal cannot."""
     last = (
         select(_event.stream, func.max(_event.seq).label("seq"))
-        .where(_event.position <= position)
+        .where(is_between(_event.position, Cursor(), cursor))
         .group_by(_event.stream)
         .subquery()
     )
@@ -64,40 +63,43 @@ async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -
     )
     for row in await journal.query(said.order_by(_event.position)):
         removed = msgspec.json.decode(row.body, type=StreamRemoved)
-        end = removed.end if row.position <= position else _then(removed, position, read_kept)
+        end = removed.end if cursor.has(row.position) else _then(removed, cursor, read_kept)
         if end.seq > heads.get(removed.stream, NOTHING).seq:
             heads[removed.stream] = end
     return heads
 
 
-def _then(removed: StreamRemoved, position: int, read_kept: ReadKept) -> Head:
-    """Return the end of a stream as it was at `position`, before it was taken out. Raise Conflict if
-    it was dropped, with events on both sides of that position."""
+def _then(removed: StreamRemoved, cursor: Cursor, read_kept: ReadKept) -> Head:
+    """Return the end of a stream as it was at the moment `cursor`, before it was taken out. Raise Conflict
+    if it was dropped, with events on both sides of that moment, or in several slots."""
     if removed.kept:
-        return _end(read_kept(removed.kept), position)
-    if removed.last <= position:
-        return removed.end
-    if removed.first > position:
-        return NOTHING
+        return _end(read_kept(removed.kept), cursor)
+    if slot_of(removed.first) == slot_of(removed.last):
+        if cursor.has(removed.last):
+            return removed.end
+        if not cursor.has(removed.first):
+            return NOTHING
     raise Conflict(
         f"{removed.stream}, which went on then, was dropped for its age; only lines from before or "
         "after it can be compared."
     )
 
 
-def digest_of(branch: Branch, position: int, heads: dict[str, Head]) -> str:
-    """Return the SHA-256, in hex, over a branch, a position and the ends of all streams (`heads`)."""
+def digest_of(branch: Branch, cursor: Cursor, heads: dict[str, Head]) -> str:
+    """Return the SHA-256, in hex, over a branch, a moment and the ends of all streams (`heads`). The moment
+    of a log of one writer is a number."""
+    position = str(cursor) if len(cursor.numbers) > 1 else cursor.end_in(0)
     parts = sorted((stream, head.seq, head.chain) for stream, head in heads.items())
     return hashlib.sha256(msgspec.msgpack.encode((branch, position, parts))).hexdigest()
 
 
-def _end(events: Iterable[Event], position: int) -> Head:
-    """Return the end (number and hash) of one stream as it was at `position` of the log. `events`:
-    all events of the stream, oldest first. Events after `position` are ignored; if there are no
-    others, the result is `NOTHING`."""
+def _end(events: Iterable[Event], cursor: Cursor) -> Head:
+    """Return the end (number and hash) of one stream at the moment `cursor` of the log. `events`:
+    all events of the stream, oldest first. Later events are ignored; if there are no others, the
+    result is `NOTHING`."""
     head = NOTHING
     for event in events:
-        if event.position > position:
+        if not cursor.has(event.position):
             break
         head = Head(event.seq, link(head.chain, event))
     return head

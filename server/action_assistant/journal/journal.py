@@ -55,6 +55,7 @@ _FINE: Final = ""
 _PROBE_ROW: Final = {"stream": "health", "seq": 0, "proof": b"", "state": b""}
 _PAGE: Final = 500  # events that a follower reads at once
 _HELD: Final = 1000  # events that wait for a follower in memory; after that it reads them
+_POLLED_S: Final = 0.5  # between two looks for events of other processes
 _BRIEF: Final = 64 * 1024  # bytes of events that are written without a thread
 # The tables of the log are the same for both branches.
 _head, _snapshot = editor_head.c, editor_snapshot.c
@@ -133,6 +134,9 @@ class Journal(JournalReader):
         self._untold = 0  # jobs given to the writer's thread whose results were not reported yet
         self._followers: set[Follower] = set()
         self._closed = False
+        self._polling: asyncio.Task[None] | None = None
+        if session.is_shared:
+            self._polling = self._loop.create_task(self._poll(), name="poll of the log")
         self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
 
     @staticmethod
@@ -377,6 +381,8 @@ class Journal(JournalReader):
         if self._closed:
             return
         self._closed = True
+        if self._polling is not None:
+            self._polling.cancel()
         self._probe.close()
         self._submit()
         await asyncio.to_thread(self._writer.close)
@@ -433,7 +439,10 @@ class Journal(JournalReader):
             except Exception:  # a fault in one caller must not keep results from the others
                 log.exception("the outcome of a job was not heard")
             for follower in self._followers:
-                follower.hear(events)
+                if self._polling is None:
+                    follower.hear(events)
+                elif events:  # those of other processes may come before them
+                    follower.wake()
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
         if self._closed:
@@ -452,21 +461,35 @@ class Journal(JournalReader):
         finally:
             self._followers.discard(follower)
 
-    async def _heard(self, follower: Follower, last: Cursor) -> AsyncIterator[Event]:
-        """Yield new events after the moment `last` from the queue of a follower, or from the
-        database if the queue overflowed, until the journal is closed."""
+    async def _heard(self, follower: Follower, seen: Cursor) -> AsyncIterator[Event]:
+        """Yield new events after the moment `seen` from the queue of a follower, or from the database
+        if the queue overflowed, until the journal is closed."""
         while True:
             found = await follower.next()
             if found is None:
                 return
-            if not found or not last.has(found[0].position - 1):
-                found = await self.read_since(last)
-                if len(found) == _PAGE:
+            if not found or not seen.has(found[0].position - 1):
+                found = await self.read_since(seen)
+                if len(found) >= _PAGE:
                     follower.wake()
             for each in found:
-                if not last.has(each.position):
-                    last = last.after(each.position)
+                if not seen.has(each.position):
+                    seen = seen.after(each.position)
                     yield each
+
+    async def _poll(self) -> None:
+        """Wake the followers when other processes have stored events."""
+        seen = Cursor()
+        while True:
+            await asyncio.sleep(_POLLED_S)
+            if not self._followers:
+                continue
+            with contextlib.suppress(Unavailable):  # told by whoever writes
+                now = await self.cursor()
+                if now != seen:
+                    seen = now
+                    for follower in self._followers:
+                        follower.wake()
 
 
 def _in_slot(slot: int, rows: Sequence[Sequence[Any]]) -> list[Sequence[Any]]:

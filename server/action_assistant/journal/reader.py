@@ -25,7 +25,7 @@ from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import NOTHING, Head
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.events import BareEvent, Event, StreamSnapshot
-from action_assistant.journal.slots import Cursor, ends_of_slots, later
+from action_assistant.journal.slots import Cursor, LogOrder, cursor_of
 from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
 T = TypeVar("T")
@@ -86,15 +86,14 @@ class JournalReader:
         positions."""
         return await self._events(following(after, limit))
 
-    async def read_since(self, moment: Cursor) -> list[Event]:
-        """Return events of all streams that came after a moment, in order of their positions: all of them,
-        or as many as are read at once."""
-        chosen = EVENTS.where(later(_event.position, moment))
-        return await self._events(chosen.order_by(_event.position).limit(_PAGE))
+    async def read_since(self, moment: Cursor, limit: int = _PAGE) -> list[Event]:
+        """Return up to about `limit` events of all streams after a moment; each stream is in its order. An
+        empty list: there are no others."""
+        return await self._ask(lambda connection: _read_since(connection, moment, limit))
 
     async def cursor(self) -> Cursor:
-        """Return the moment after the newest event of each writer."""
-        return await self._ask(lambda c: Cursor.at(ends_of_slots(c, _event.position)))
+        """Return the present moment of the log."""
+        return await self._ask(lambda connection: cursor_of(connection, _event.position))
 
     async def newest(self, stream: str) -> int:
         """Return the sequence number of the last event of a stream; 0 if the stream is empty."""
@@ -175,6 +174,38 @@ def _plain(result: CursorResult[Any]) -> list[Sequence[Any]]:
 def following(position: int, limit: int) -> Select[Any]:
     """Return a query for the first `limit` events of all streams after a position, in order."""
     return EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
+
+
+def _read_since(connection: Connection, seen: Cursor, limit: int) -> list[Event]:
+    now = cursor_of(connection, _event.position)
+    pages: dict[int, list[Sequence[Any]]] = {}
+    for slot in range(len(now.numbers)):
+        low, high = seen.end_in(slot), now.end_in(slot)
+        if low < high:
+            chosen = following(low, limit).where(_event.position <= high)
+            pages[slot] = _plain(connection.execute(chosen))
+    rows = next(iter(pages.values()), []) if len(pages) < 2 else _ordered(pages, limit)
+    return [Event(*row) for row in rows]
+
+
+def _ordered(pages: Mapping[int, Sequence[Sequence[Any]]], limit: int) -> list[Sequence[Any]]:
+    """Return events of several slots (`pages`: their columns) in an order that keeps each stream's, up to
+    where the first page of `limit` events ends: its slot may go on."""
+    before: dict[str, int] = {}
+    for page in pages.values():
+        for stream, seq, *_ in page:
+            before[stream] = min(seq - 1, before.get(stream, seq))
+    order = LogOrder(pages, seen=before)
+    for slot, page in pages.items():
+        order.add(slot, page)
+    found: list[Sequence[Any]] = []
+    while not order.has_ended:
+        found += order.take()
+        if (ended := order.needed) is not None:
+            if len(pages[ended]) >= limit:
+                break
+            order.add(ended, [])
+    return found
 
 
 def body_of(connection: Connection, stream: str, seq: int) -> bytes:

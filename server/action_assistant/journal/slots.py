@@ -6,11 +6,21 @@ within a stream counts, and `LogOrder` finds an order of all events that keeps i
 """
 
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Column, ColumnElement, Connection, Select, and_, func, or_, select
+from sqlalchemy import (
+    Column,
+    ColumnElement,
+    Connection,
+    Select,
+    and_,
+    false,
+    func,
+    or_,
+    select,
+)
 
 #: Writers of one log at the same time, at most: all positions stay below 2**53, so JSON holds them.
 SLOTS: Final = 64
@@ -43,6 +53,8 @@ def ends_of_slots(connection: Connection, position: Column[int]) -> list[int]:
     end = connection.execute(select(func.max(position))).scalar()
     while end is not None:
         ends.append(end)
+        if slot_of(end) == 0:
+            break
         lower = select(func.max(position)).where(position <= before_first(slot_of(end)))
         end = connection.execute(lower).scalar()
     return ends[::-1]
@@ -76,6 +88,11 @@ class Cursor(msgspec.Struct, frozen=True):
     def __str__(self) -> str:
         return ".".join(map(str, self.numbers)) or "0"
 
+    @property
+    def events(self) -> int:
+        """Return the number of events up to this moment, with those that were deleted since."""
+        return sum(self.numbers)
+
     def end_in(self, slot: int) -> int:
         """Return the position up to which the events of a slot were seen."""
         number = self.numbers[slot] if slot < len(self.numbers) else 0
@@ -84,6 +101,10 @@ class Cursor(msgspec.Struct, frozen=True):
     def has(self, position: int) -> bool:
         """Return whether the event at a position was seen."""
         return position <= self.end_in(slot_of(position))
+
+    def covers(self, other: "Cursor") -> bool:
+        """Return whether all that was seen at another moment was seen at this one."""
+        return all(self.end_in(slot) >= other.end_in(slot) for slot in range(len(other.numbers)))
 
     def after(self, position: int) -> "Cursor":
         """Return the moment after the event at a position, if that comes later in its slot."""
@@ -110,6 +131,28 @@ def slot_in(position: Column[int]) -> ColumnElement[int]:
     return position // (1 << _BITS)
 
 
+def cursor_of(connection: Connection, position: Column[int]) -> Cursor:
+    """Return the present moment of a log, by the column `position` of its events."""
+    return Cursor.at(ends_of_slots(connection, position))
+
+
+def order_in_time(
+    connection: Connection, position: Column[int], at: Column[int], seq: Column[int]
+) -> tuple[Column[int], ...]:
+    """Return the columns by which events of several streams are sorted, the oldest first. Of a log of one
+    writer that is the position; else the clocks of its writers have to do, and `seq` within one moment."""
+    newest = connection.execute(select(func.max(position))).scalar() or 0
+    return (position,) if slot_of(newest) == 0 else (at, seq, position)
+
+
+def is_between(position: Column[int], seen: Cursor, now: Cursor) -> ColumnElement[bool]:
+    """Return the condition for events after the moment `seen` up to the moment `now`."""
+    slots = range(len(now.numbers))
+    ranges = [(seen.end_in(slot), now.end_in(slot)) for slot in slots]
+    later = [and_(position > low, position <= high) for low, high in ranges if low < high]
+    return or_(false(), *later)
+
+
 def _trimmed(numbers: list[int]) -> tuple[int, ...]:
     while numbers and not numbers[-1]:
         numbers.pop()
@@ -121,16 +164,23 @@ class LogOrder:
     stream, with an event that removes a stream after what is left of that stream. Where that leaves a
     choice, the older one comes first. If events are missing there is no such order, and all come
     nevertheless. `removed`: returns which stream an event removes from the log, and its last seq; None for
-    other events. Rows have the columns of an event in its order, and may have more."""
+    other events. `seen`: the last seq of each stream before the first rows, 0 where it is missing. Rows have the columns of an event in its order, and may have more."""
 
     def __init__(
         self,
-        slots: Sequence[int],
+        slots: Iterable[int],
         removed: Callable[[Sequence[Any]], tuple[str, int] | None] = lambda _: None,
+        *,
+        seen: Mapping[str, int] | None = None,
     ) -> None:
         self._waiting: dict[int, deque[Sequence[Any]]] = {slot: deque() for slot in slots}
-        self._seen: dict[str, int] = {}  # the last seq of each stream
+        self._seen: dict[str, int] = dict(seen or {})
         self._removed = removed
+
+    @property
+    def has_ended(self) -> bool:
+        """Return whether every row was taken."""
+        return not self._waiting
 
     @property
     def needed(self) -> int | None:

@@ -116,10 +116,10 @@ class Transaction:
             _check_text(each.kind)
             _check_text(each.author)
         head = self._head(stream)
-        if addition.expected is not None and addition.expected != head.seq:
-            raise Conflict(f"{stream} has gone on to {head.seq}; {addition.expected} was expected.")
-        if addition.epoch is not None and addition.epoch != self._epochs.get(stream):
-            raise Conflict(f"Another process owns {stream} now.")
+        if self._session.is_shared and self._refusal(addition, head):
+            head = self._head_again(stream)
+        if refusal := self._refusal(addition, head):
+            raise Conflict(refusal)
         at, seq, chain = utc_us(), head.seq, head.chain
         for draft in addition.drafts:
             seq += 1
@@ -205,6 +205,23 @@ class Transaction:
             self._storing = False
             for event, chain in events:
                 self._stored[event.stream] = Head(event.seq, chain)
+
+    def _refusal(self, addition: Addition, head: Head) -> str:
+        """Return why an addition was not made for the end of its stream (`head`); "" if it was."""
+        stream, expected = addition.stream, addition.expected
+        if expected is not None and expected != head.seq:
+            return f"{stream} has gone on to {head.seq}; {expected} was expected."
+        if addition.epoch is not None and addition.epoch != self._epochs.get(stream):
+            return f"Another process owns {stream} now."
+        return ""
+
+    def _head_again(self, stream: str) -> Head:
+        """Return the end of a stream as the database has it now: in a shared one another process may have
+        moved it since it was read. Events that wait in this transaction were made for the end that was
+        read, and are compared with it when they are stored."""
+        if self._heads[stream] == self._stored[stream]:
+            del self._heads[stream]
+        return self._head(stream)
 
     def _head(self, stream: str) -> Head:
         head = self._heads.get(stream)

@@ -159,7 +159,7 @@ def checked(
                     f"The journal of the {branch} is damaged: {sentence(damage)}. "
                     "`verify` tells more."
                 )
-            events = await journal.position()
+            events = (await journal.cursor()).events
             if expected not in {None, events}:
                 raise CannotStart(
                     f"The journal of the {branch} ends at event {events}, not at {expected}."

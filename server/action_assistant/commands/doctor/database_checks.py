@@ -30,6 +30,7 @@ from action_assistant.journal.events import Event
 from action_assistant.journal.failover import failover_of, hosts_of
 from action_assistant.journal.migrate import recognize, revisions_of, steps_after
 from action_assistant.journal.postgres import weakness
+from action_assistant.journal.slots import ends_of_slots, newest_in, slot_of
 from action_assistant.schema.editor_tables import editor_event, editor_head, graph
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 
@@ -100,8 +101,12 @@ _event, _head = editor_event.c, editor_head.c  # both databases have these table
 def newest_at(connection: Connection) -> int | None:
     """Return when the newest events in a database were written, in microseconds since 1970; None
     without events."""
-    newest = select(_event.at).order_by(_event.position.desc()).limit(50)
-    return max((row.at for row in connection.execute(newest) if type(row.at) is int), default=None)
+    found: list[int] = []
+    for end in ends_of_slots(connection, _event.position):
+        newest = select(_event.at).where(_event.position <= end)
+        rows = connection.execute(newest.order_by(_event.position.desc()).limit(50))
+        found += [row.at for row in rows if type(row.at) is int]
+    return max(found, default=None)
 
 
 def oldest_at(connection: Connection) -> int | None:
@@ -507,5 +512,5 @@ def _holds_mark(connection: Connection, data: Path) -> bool:
         return True
     if not inspect(connection).has_table(editor_event.name):
         return False
-    last = connection.execute(select(func.max(editor_event.c.position))).scalar()
-    return (last or 0) >= mark.position
+    newest = newest_in(editor_event.c.position, slot_of(mark.position))
+    return int(connection.execute(newest).scalar_one()) >= mark.position

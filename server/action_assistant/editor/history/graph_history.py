@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
 from msgspec.structs import replace
-from sqlalchemy import Connection, Row, select
+from sqlalchemy import Connection, Row, and_, or_, select
 
 from action_assistant.editor.catalogue.versions import VersionView, versions_by_event
 from action_assistant.editor.documents.values import ends_of
@@ -19,6 +19,7 @@ from action_assistant.editor.history.change_summaries import Changes, Stretch, t
 from action_assistant.editor.history.key_changes import LoggedChange, OverwrittenValue, owner_of
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people.people import stored_people
+from action_assistant.journal.slots import order_in_time
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.keys import PersonRef
 
@@ -304,15 +305,21 @@ def _changes(
 def _rows(connection: Connection, graph: str, before: int | None, most: int) -> list[Row[Any]]:
     event = editor_tables.editor_event.c
     document = h.graph_stream(graph)
+    order = order_in_time(connection, event.position, event.at, event.seq)
     chosen = (
         select(event.seq, event.kind, event.author, event.at)
         .where(event.stream.in_([document, h.about_stream(graph)]))
-        .order_by(event.position.desc())
+        .order_by(*(column.desc() for column in order))
         .limit(most)
     )
     if before is not None:
-        there = select(event.position).where(event.stream == document, event.seq == before)
-        chosen = chosen.where(event.position < there.scalar_subquery())
+        first = order[0]
+        there = select(first).where(event.stream == document, event.seq == before)
+        earlier = first < there.scalar_subquery()
+        if first is event.at:  # events of one batch have the same time
+            same = and_(event.stream == document, event.seq < before)
+            earlier = or_(same, and_(event.stream != document, earlier))
+        chosen = chosen.where(earlier)
     return list(connection.execute(chosen))
 
 

@@ -41,11 +41,13 @@ class EpochBegun(msgspec.Struct, frozen=True):
     why: Why
 
 
-class EpochMark(msgspec.Struct, frozen=True):
-    """The last event that this data folder has seen, and the chain up to it as hex."""
+class EpochMark(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The last event that this data folder has seen, and the chain up to it as hex. `others`: the same of
+    the slots after slot 0, where several editors have written."""
 
     position: int
     chain: str
+    others: tuple[tuple[int, str], ...] = ()
 
 
 async def begin(journal: Journal, why: Why, *, after: int | None = None) -> str:
@@ -79,24 +81,29 @@ async def living_in(journal: Journal, data: Path) -> AsyncIterator[str]:
 
 
 async def _epoch(journal: Journal, mark: Path) -> str:
-    newest = await journal.newest(_STREAM)
-    if newest == 0:
+    while True:
+        newest = await journal.newest(_STREAM)
         try:
-            return await begin(journal, "the first", after=0)
-        except Conflict:  # another editor began it just now
-            newest = await journal.newest(_STREAM)
-    (event,) = await journal.read(_STREAM, after=newest - 1)
-    epoch = msgspec.json.decode(event.body, type=EpochBegun).id
-    if await _follows(journal, marked(mark)):
-        return epoch
-    log.warning("the log lacks what was in it before: open pages are told, and begin anew")
-    return await begin(journal, "the log had gone back")
+            if newest == 0:
+                return await begin(journal, "the first", after=0)
+            (event,) = await journal.read(_STREAM, after=newest - 1)
+            epoch = msgspec.json.decode(event.body, type=EpochBegun).id
+            if await _follows(journal, marked(mark)):
+                return epoch
+            log.warning("the log lacks what was in it before: open pages are told, and begin anew")
+            return await begin(journal, "the log had gone back", after=newest)
+        except Conflict:  # another editor has begun one meanwhile
+            continue
 
 
 async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
-    """Return whether the log still has the event of `mark`, with the same hash chain, and so
+    """Return whether the log still has the events of `mark`, with the same hash chain, and so
     continues it; True if `mark` is None."""
-    return mark is None or await _chain(journal, mark.position) == mark.chain
+    ends = () if mark is None else ((mark.position, mark.chain), *mark.others)
+    for position, chain in ends:
+        if await _chain(journal, position) != chain:
+            return False
+    return True
 
 
 async def _chain(journal: Journal, position: int) -> str:
@@ -127,8 +134,14 @@ async def _remember(journal: Journal, mark: Path) -> None:
     breaks.
     """
     try:
-        position = await journal.position()
-        text = msgspec.json.encode(EpochMark(position, await _chain(journal, position)))
+        now = await journal.cursor()
+        ends = [
+            now.end_in(slot)
+            for slot in range(max(1, len(now.numbers)))
+            if slot == 0 or now.numbers[slot]
+        ]
+        chains = [(end, await _chain(journal, end)) for end in ends]
+        text = msgspec.json.encode(EpochMark(*chains[0], tuple(chains[1:])))
         await asyncio.to_thread(partial(replace_file, mark, text, is_durable=False))
     except (OSError, Unavailable) as error:
         log.warning("cannot write %s: %s", mark, error)

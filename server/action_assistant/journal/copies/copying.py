@@ -12,7 +12,7 @@ from action_assistant.journal.database import Branch, Database, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.migrate import recognize
 from action_assistant.journal.removal import removed_by, taken_out
-from action_assistant.journal.slots import pages_in_order
+from action_assistant.journal.slots import before_first, ends_of_slots, pages_in_order, slot_of
 from action_assistant.schema import editor_tables
 from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
@@ -122,13 +122,16 @@ def _is_older(old: Connection, new: Connection) -> bool:
     of the hash chains are compared, which stand for all fields of an event."""
     event = editor_event.c
     chosen = select(event.position, event.stream, event.seq, event.chain).order_by(event.position)
-    after = 0
-    while rows := old.execute(chosen.where(event.position > after).limit(_COMPARED)).all():
-        last = rows[-1].position
-        same = new.execute(chosen.where(event.position > after, event.position <= last)).all()
-        if [tuple(row) for row in rows] != [tuple(row) for row in same]:
-            return False
-        after = last
+    for end in ends_of_slots(old, event.position):
+        after = before_first(slot_of(end))
+        while after < end:
+            some = event.position > after, event.position <= end
+            rows = old.execute(chosen.where(*some).limit(_COMPARED)).all()
+            last = rows[-1].position
+            same = new.execute(chosen.where(event.position > after, event.position <= last)).all()
+            if [tuple(row) for row in rows] != [tuple(row) for row in same]:
+                return False
+            after = last
     return True
 
 

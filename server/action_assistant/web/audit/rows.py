@@ -2,6 +2,7 @@
 microseconds UTC.
 """
 
+import heapq
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, get_args
@@ -11,6 +12,7 @@ from sqlalchemy import Connection, Select, func, select
 
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
+from action_assistant.journal.slots import before_first, ends_of_slots, slot_of
 from action_assistant.kit.moments import moment
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.audit.events import KEEPING, AuditDropped
@@ -40,7 +42,8 @@ _EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
 
 
 class AuditFilter(msgspec.Struct, frozen=True, kw_only=True):
-    """The rows that are asked for. `before`: only events of the log before this position. `since`,
+    """The rows that are asked for. `before`: the cursor of an earlier page: only events of the log before
+    this position, or where several editors have written before this time (µs UTC). `since`,
     `until`: microseconds UTC. `text`: a part of the row in any case."""
 
     before: int | None = None
@@ -149,6 +152,8 @@ def _page(
     """Return a page. `gone`: streams that were dropped, each with its end then; events up to that may
     be in the log for some moments more."""
     end: int = connection.execute(select(func.max(_event.position))).scalar() or 0
+    if slot_of(end) > 0:
+        return _page_by_time(connection, branch, wanted, describe, never, gone)
     cursor = end + 1 if wanted.before is None else min(wanted.before, end + 1)
     last = max(1, cursor - _MOST)
     rows: list[AuditRow] = []
@@ -172,6 +177,65 @@ def _page(
             if wanted.since is not None and newest is not None and newest < wanted.since - _DAY_US:
                 return AuditPage(tuple(rows), None, _when(back_to))
     return AuditPage(tuple(rows), cursor if cursor > 1 else None, _when(back_to))
+
+
+def _page_by_time(
+    connection: Connection,
+    branch: Branch,
+    wanted: AuditFilter,
+    describe: Describe,
+    never: Collection[str],
+    gone: Mapping[str, int],
+) -> AuditPage:
+    """Return a page of a log of several writers, by the times of its events; the cursor is a time, too. All
+    rows of one time are on one page."""
+    until = wanted.before if wanted.before is not None else 1 << 62
+    merged = heapq.merge(
+        *(
+            _slot_by_time(connection, end, until)
+            for end in ends_of_slots(connection, _event.position)
+        ),
+        key=lambda event: -event.at,
+    )
+    rows: list[AuditRow] = []
+    back_to: int | None = None
+    for looked, event in enumerate(merged):
+        if event.at != back_to and (len(rows) >= wanted.limit or looked >= _MOST):
+            return AuditPage(tuple(rows), back_to, _when(back_to))
+        back_to = event.at
+        if wanted.since is not None and event.at < wanted.since - _DAY_US:
+            break
+        is_wanted = (
+            event.kind not in never
+            and event.seq > gone.get(event.stream, 0)
+            and (not wanted.person or event.author == wanted.person)
+            and (wanted.since is None or event.at >= wanted.since)
+            and (wanted.until is None or event.at < wanted.until)
+        )
+        if is_wanted and (row := _row(branch, event, wanted, describe)) is not None:
+            rows.append(row)
+    return AuditPage(tuple(rows), None, _when(back_to))
+
+
+def _slot_by_time(connection: Connection, end: int, until: int) -> Iterator[Event]:
+    """Yield the events of a slot, whose last position is `end`, of before the time `until`, newest first. The
+    clock of its writer may have gone back by a day."""
+    begin = before_first(slot_of(end))
+    low, high = begin, end
+    while low < high:  # the last event that is not surely later
+        middle = (low + high + 1) // 2
+        there = select(_event.at).where(_event.position >= middle, _event.position <= end)
+        at = connection.execute(there.order_by(_event.position).limit(1)).scalar()
+        if at is not None and at >= until + _DAY_US:
+            high = middle - 1
+        else:
+            low = middle
+    chosen = _EVENTS.where(_event.position > begin).order_by(_event.position.desc())
+    while page := connection.execute(chosen.where(_event.position <= high).limit(_SLICE)).all():
+        for row in page:
+            if row.at < until:
+                yield Event(*row)
+        high = page[-1].position - 1
 
 
 def _events(

@@ -5,7 +5,7 @@ from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import msgspec
-from sqlalchemy import Row, select
+from sqlalchemy import Connection, Row, select
 
 from action_assistant.editor.catalogue.catalogue import NAME_LIMIT, Catalogue, GraphView
 from action_assistant.editor.catalogue.graph_reader import GraphReader
@@ -19,6 +19,7 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people.people import People
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.slots import order_in_time
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.schema.editor_tables import graph as graph_table
@@ -233,12 +234,17 @@ class Drafts:
         """Return the stored events about a draft (`row`) and its merges, in order of time."""
         event = editor_event.c
         streams = [h.about_stream(row.id), h.about_stream(row.draft_of)]
-        return await self._journal.query(
+        chosen = (
             select(event.kind, event.author, event.at, event.body)
             .where(event.stream.in_(streams), event.kind.in_(_ABOUT))
             .where((event.stream == streams[0]) | (event.kind == h.MERGED))
-            .order_by(event.position)
         )
+
+        def find(connection: Connection) -> list[Row[Any]]:
+            order = order_in_time(connection, event.position, event.at, event.seq)
+            return list(connection.execute(chosen.order_by(*order)))
+
+        return await self._journal.ask(find)
 
     # --- reading ----------------------------------------------------------------------------------
 
