@@ -127,6 +127,11 @@ PARTS: Final[dict[str, Part]] = {
         {"SOAK_CLUSTER": "100000"},
         ("tests/editor/cluster/test_model.py",),
     ),
+    "schedules": Part(
+        "50 schedules of three editors on a real Postgres",
+        {"SOAK_SCHEDULES": "50"},
+        ("tests/editor/cluster/test_schedules.py",),
+    ),
     "flips": Part(
         "10,000 flipped bytes of a log",
         {"SOAK_FLIPS": "10000"},
