@@ -27,9 +27,10 @@ LONG_FUNCTION: Final = 10  # lines; a longer public one needs a docstring
 
 #: First words that leave the subject of a sentence to be guessed.
 OPENING: Final = re.compile(
-    r"(What|Whether|Which|Who|Whose|How|Where|When|Why|As|The same|Those|That|In which|By which"
-    r"|From which|Until|Of|All of|Nothing|Something|Somebody|Someone|It|They|Them|Everything"
-    r"|Everybody|Others?|One of|Each of|Both|None)\b"
+    r"(What|Whether|Which|Who|Whom|Whose|How|Where|When|Why|As|The same|Those|That|In which|By which"
+    r"|From which|(For|By|With|Under|To|At|In) (what|whom|who|those|how)|Until|Of|All of|Nothing"
+    r"|Something|Somebody|Someone|It|They|Them|Everything|Everybody|Others?|One of|Each of|Both"
+    r"|None)\b"
 )
 #: A comment of documentation in TypeScript, with the text of its first line.
 _TSDOC: Final = re.compile(r"/\*\*\s*(?:\*\s*)?(?P<first>[^\n]*)")

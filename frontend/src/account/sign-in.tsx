@@ -25,8 +25,10 @@ interface Props {
   onOpen: (person: Person) => void;
 }
 
-/** Return the credential in a pasted text. A text without a fragment is a code of 8 characters, or else
- * the token. */
+/**
+ * Return the credential in a pasted text. A text without a fragment is a code of 8 characters, or else
+ * the token.
+ */
 export function pastedCredential(pasted: string): Credential {
   const text = pasted.trim();
   const kind = /^[A-Za-z0-9]{4}[- ]?[A-Za-z0-9]{4}$/.test(text) ? "device" : "token";
@@ -208,7 +210,10 @@ export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
   );
 }
 
-/** `enter` asks the server with what was typed; what it throws is shown at the field. */
+/**
+ * Keeps the state of a field by which people sign in. `enter` asks the server with what was typed; what it throws is
+ * shown at the field.
+ */
 export function useSignInField(
   enter: (typed: string) => Promise<Person>,
   onOpen: (person: Person) => void,

@@ -19,7 +19,7 @@ import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./share-dialog.module.css";
 
-/** For how long a link lasts, in days. */
+/** The choices of how long a link lasts, in days. */
 const LASTS = [
   { value: "1", label: "1 day" },
   { value: "7", label: "7 days" },

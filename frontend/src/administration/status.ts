@@ -12,7 +12,7 @@ export type Finding = EditorApi["Diagnostic"];
 
 const EACH_MS = 5_000;
 
-/** A process, looked at again and again. `at` is where it answers, "" for the editor. */
+/** Query the state of a process again and again. `at`: the address at which it answers, "" for the editor. */
 export function useStatus(name: string, at: string | undefined) {
   return useQuery({
     queryKey: ["status", name, at],
@@ -59,7 +59,7 @@ export function useExamination() {
 
 const UNITS = ["bytes", "kB", "MB", "GB", "TB"] as const;
 
-/** `714 kB`, `1.4 GB`: of 1000 each, as disks are sold. */
+/** Return a size of bytes in words, as `714 kB` or `1.4 GB`, by steps of 1000. */
 export function bytes(count: number): string {
   let value = count;
   let unit = 0;
@@ -71,7 +71,7 @@ export function bytes(count: number): string {
   return `${value.toFixed(digits)} ${UNITS[unit]}`;
 }
 
-/** `3 days 4 h`, `2 h 5 min`, `40 s`: the two largest parts. */
+/** Return a duration (ms) in words, as `3 days 4 h`, `2 h 5 min` or `40 s`: its two largest parts. */
 export function span(ms: number): string {
   const s = Math.max(0, Math.floor(ms / 1000));
   const days = Math.floor(s / 86_400);

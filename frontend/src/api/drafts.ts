@@ -67,7 +67,7 @@ export function makeDraft(graph: string, body: EditorApi["NewDraft"]): Promise<G
   return editor.post("/api/graphs/{graph_id}/drafts", { path: { graph_id: graph }, body });
 }
 
-/** One edit of the side that is merged into; refused where either was changed since. */
+/** Merge a draft and its origin, as one edit of the side that is merged into. Refused if either was changed since. */
 export function mergeDraft(
   id: string,
   body: EditorApi["WantedMerge"],

@@ -82,7 +82,7 @@ export function useProblems(graph: string, seq: number) {
 
 type Place = string | null | undefined;
 
-/** `folder`: in which the graph is made, if any; also of what imports and copies make. */
+/** Make an empty graph. `folder`: the folder in which it is made, if any; likewise for imports and copies. */
 export function createGraph(name: string, folder: Place): Promise<GraphSummary> {
   return editor.post("/api/graphs", { query: { folder }, body: { name }, status: 201 });
 }

@@ -12,7 +12,7 @@ export type HistoryEntry = EditorApi["HistoryEntry"];
 
 const inGraph = (id: string) => ({ graph_id: id });
 
-/** Newest first. `seq`: the moment on screen, with which it is read again. */
+/** Query the newest entries of the history of a graph, newest first, anew for each `seq`, the moment on screen. */
 export function useHistory(id: string, seq: number) {
   return useQuery({
     queryKey: ["history", id, seq],

@@ -174,7 +174,7 @@ export async function fetchText(url: string, request: RequestOptions = {}): Prom
   return (await fetchAnswer(url, request)).text();
 }
 
-/** One sentence for people, whatever went wrong. */
+/** Return one sentence for people about an error, whatever it is. */
 export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }

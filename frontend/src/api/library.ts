@@ -27,7 +27,7 @@ export function fetchLibrary(signal?: AbortSignal): Promise<LibraryAction[]> {
   return editor.get("/api/actions", { signal });
 }
 
-/** For how long an answer serves parts of the page that come after the one that has asked, ms. */
+/** The time, ms, for which an answer also serves parts of the page that ask later. */
 const ASKED = 10_000;
 
 export function useLibrary() {
@@ -85,7 +85,7 @@ export function useDeletedActions(wanted: boolean) {
   });
 }
 
-/** `fromGraphs`: with what graphs know of it, instead of empty. */
+/** Make an action of the library. `fromGraphs`: with what graphs know of it, instead of empty. */
 export function createAction(name: string, fromGraphs = false): Promise<GraphSummary> {
   const body = fromGraphs ? { name, from_graphs: true } : { name };
   return editor.post("/api/actions", { body, status: 201 });

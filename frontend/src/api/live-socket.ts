@@ -431,7 +431,7 @@ export class LiveSocket {
   }
 }
 
-/** No listener that fails keeps another one, or what comes after, from its turn. */
+/** Calls all listeners. One that fails keeps no other one, and nothing that comes after, from its turn. */
 export function tellEach(listeners: Iterable<() => void>): void {
   for (const listener of listeners) {
     try {
@@ -481,8 +481,8 @@ function keptActions(before: RunActionsTold, now: RunActionsTold): RunActionsTol
 }
 
 /**
- * Each message tells of all actions, and few have changed: what did not is not drawn again. A run of
- * which nothing has changed is the one from before.
+ * Returns the new state of a run with the same objects for all that has not changed, so that it is not drawn again;
+ * `before` itself if nothing has.
  */
 export function withKeptParts(before: Run | undefined, now: Run): Run {
   if (before?.actions == null || now.actions == null) return now;

@@ -119,7 +119,7 @@ const unknown = (lost: string): LiveState =>
         unreached: { kind: "silent", why: `The runner’s address is not known. ${lost}` },
       };
 
-/** `run`: the run about which it is asked, where the state of its site is meant and not that of all. */
+/** Return the state of the live link. `run`: the id of a run, for the state of its site instead of that of all sites. */
 export function useLive(run?: string): PageLinkState & { now: LiveState } {
   const hold = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   const { live, lost } = hold;

@@ -12,7 +12,7 @@ type KnownPerson = EditorApi["Participant"];
 /** Color of people who have not been here for long: no other person can have it. */
 export const NOBODYS_COLOR = "#757575";
 
-/** `color` where it is one, since it comes over the wire and goes into styles. */
+/** Returns a color that is safe in styles: `color` itself, or that of nobody for any other text. */
 export function checkedColor(color: string): string {
   return /^#[0-9a-f]{6}$/i.test(color) ? color : NOBODYS_COLOR;
 }

@@ -7,14 +7,18 @@ import { runnerOfRobot, takenElsewhere } from "./sites";
 
 export const SIMULATOR = "simulator";
 
-/** A robot, or the simulator. `servers`: how many answer on the path of its get, where one makes answers
- * a proof; `others`: programs beside this one that publish starts. */
+/**
+ * A robot, or the simulator. `servers`: how many answer on the path of its get, where one makes answers
+ * a proof; `others`: programs beside this one that publish starts.
+ */
 export type Robot = RunnerApi["Robot"];
 /** `failure`: why it failed, "" if it passed; `proof_ms`: null where nothing proved the Stop. */
 export type Drill = RunnerApi["DrillShown"];
 export type EngineState = Robot["state"];
-/** A graph that an engine holds, ended ones too. `stopping`: why a stop of it is not proven yet, "" at
- * first; null when nobody wants that. */
+/**
+ * A graph that an engine holds, ended ones too. `stopping`: why a stop of it is not proven yet, "" at
+ * first; null when nobody wants that.
+ */
 export type HeldGraph = RunnerApi["HeldGraph"];
 export type Registration = Required<RunnerApi["Registration"]>;
 /** An engine in sight that nobody registered. An idle one does not say its name. */
@@ -24,8 +28,10 @@ export type IndexedByRobot = RunnerApi["RobotKnowledge"];
 export type RobotLogLine = RunnerApi["RobotLogLine"];
 /** One thing that was looked at before a start. */
 export type PreflightItem = RunnerApi["Item"];
-/** `override`: the codes that a person would have to answer for; `never`: something stands in the way
- * that cannot be overridden. */
+/**
+ * `override`: the codes that a person would have to answer for; `never`: something stands in the way
+ * that cannot be overridden.
+ */
 export type Preflight = RunnerApi["Preflight"];
 
 const path = (runner: string, name: string) =>
@@ -95,7 +101,10 @@ export function useRobotLog(runner: string | undefined, robot: string, on: boole
   });
 }
 
-/** `runner`: of the site that is to lead it. Throws if another site has a robot of this name, or may have one. */
+/**
+ * Register a robot. `runner`: of the site that is to lead it. Throws if another site has a robot of this name, or may
+ * have one.
+ */
 export async function registerRobot(runner: string, robot: Registration): Promise<Robot> {
   const taken = takenElsewhere(robot.name, runner);
   if (taken !== "") throw new Error(taken);

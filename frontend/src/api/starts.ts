@@ -130,7 +130,7 @@ export function runPreflight(
 /** State of the index folder as the runner sees it, and the files that could be written there. */
 export type IndexFolderLook = RunnerApi["IndexFolderState"];
 
-/** Has graphs inside of a task written there. */
+/** Have graphs inside of a task written into the folder in which the engine of a robot looks them up. */
 export function writeIntoIndex(
   runner: string,
   robot: string,

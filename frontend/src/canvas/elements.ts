@@ -130,7 +130,7 @@ export interface NodeOptions {
 }
 
 export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks"> & {
-  /** With what each action ended in another run that is compared with this one. */
+  /** The outcome of each action in another run that is compared with this one. */
   ghosts?: ReadonlyMap<Key, string> | undefined;
 };
 

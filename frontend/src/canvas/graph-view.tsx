@@ -22,7 +22,7 @@ interface Props {
   graph: Graph;
   progress: ReadonlyMap<Key, Progress>;
   selected?: ReadonlySet<string>;
-  /** With what each action ended in the run that is compared with this one. */
+  /** The outcome of each action in the run that is compared with this one. */
   ghosts?: ReadonlyMap<Key, string>;
   label: string;
   onSelect?: (key: Key | null) => void;

@@ -163,7 +163,10 @@ export function UntakenList({ arrows, ...others }: Props) {
   );
 }
 
-/** By relation, those that are listed twice alike: a course cannot tell them apart. */
+/**
+ * Return the outcomes that no course takes, by relation, and the actions that none visits. Relations that are listed
+ * twice have the same: a course cannot tell them apart.
+ */
 export function untakenPlaces(graph: Graph, { coverage }: CheckedCourses): UntakenPlaces {
   const pairs = new Map<string, Precondition[]>();
   for (const { parent, child, outcome } of coverage.untaken) {
@@ -180,7 +183,7 @@ export function untakenPlaces(graph: Graph, { coverage }: CheckedCourses): Untak
   return { outcomes, actions: new Set(coverage.unvisited) };
 }
 
-/** `Dock_0 → Charge_0`. */
+/** Return an arrow in words, as `Dock_0 → Charge_0`. */
 export function arrowWords(graph: Graph, { parent, child }: OutcomeArrow): string {
   return `${isolated(endName(graph, parent))} → ${isolated(endName(graph, child))}`;
 }

@@ -76,7 +76,10 @@ const faulty: Readonly<Record<Exclude<DecidedFaultKind, "stop">, Behaviour>> = {
   deaf: { ignores_stop: true },
 };
 
-/** One behaviour for each call; the last repeats, so what nobody decided comes last. */
+/**
+ * Returns the script of a dry-run. Each action has one behaviour for each call; the last repeats, so what nobody
+ * decided comes last.
+ */
 export function scriptOf({ decisions, fault, before = {} }: Decisions): Script {
   const calls = new Map(Object.entries(before).map(([node, list]) => [node, [...list]]));
   const usual = (node: string): Behaviour =>

@@ -125,7 +125,10 @@ function valuesAt(run: Run, names: ReadonlyMap<string, string>, at: number): See
   });
 }
 
-/** `graph`: what is played; `differs`: in how many places it is not what ran. `at`: ms since 1970. */
+/**
+ * Returns the beginning of a dry-run from a moment of a run. `graph`: what is played; `differs`: in how many places it
+ * is not what ran. `at`: ms since 1970.
+ */
 export function seedOf(run: Run, graph: Graph, differs: number, at: number): DryRunSeed {
   const doubts: SeedDoubt[] = [];
   if (differs > 0) {

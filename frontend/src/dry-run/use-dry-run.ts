@@ -193,7 +193,7 @@ function useResult(
 const NO_VALUES: StartValues = {};
 const NOT_ASKED: readonly AskedInput[] = [];
 
-/** With what it begins, what was decided since, and where in it one is. */
+/** Keeps how a dry-run begins, what was decided since, and the moment that is shown. */
 function useDecisions() {
   const [seed, setSeed] = useState<DryRunSeed | null>(null);
   const [part, setPart] = useState<DryRunPart | null>(null);
@@ -226,7 +226,10 @@ function useDecisions() {
   return { seed, part, decided, setDecided, at, setAt, playing, play, given, give, begin, restart };
 }
 
-/** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
+/**
+ * Keeps the state of the dry-run of a graph; its result is null while none is open. `seq`: the moment of the graph
+ * that the page shows.
+ */
 export function useDryRun(id: string, graph: Graph, seq: number) {
   const [open, setOpen] = useState(false);
   const { seed, part, decided, setDecided, at, setAt, playing, play, given, give, ...beginnings } =

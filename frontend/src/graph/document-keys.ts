@@ -41,7 +41,7 @@ function perRoot(make: (root: Root) => ReadonlyMap<string, unknown>): Maps {
   };
 }
 
-/** `head` names the owner, `rest` the field; without `|` the rest is empty. */
+/** Splits a key of the document at its first `|`: `head` names the owner, `rest` the field, empty without one. */
 export function splitKey(key: string): { head: string; rest: string } {
   const bar = key.indexOf("|");
   return bar < 0 ? { head: key, rest: "" } : { head: key.slice(0, bar), rest: key.slice(bar + 1) };

@@ -92,7 +92,7 @@ export interface GraphSource {
   close(): void;
 }
 
-/** `soon` calls back for what others changed; once for several transactions, if it likes. */
+/** Follows the graph of a document. `soon` calls back for changes of others, once for several transactions if it likes. */
 export function followGraph(
   doc: Y.Doc,
   soon: (tell: () => void) => void = (tell) => tell(),

@@ -42,7 +42,7 @@ const responses: ReadonlySet<unknown> = new Set(RESPONSES);
 export const asResponse = (value: unknown): Response | undefined =>
   responses.has(value) ? (value as Response) : undefined;
 
-/** JSON as text, unparsed; undefined when it is none or nested deeper than 64. */
+/** Returns the text if it is JSON; undefined when it is none, or nested deeper than 64. */
 export function asJsonText(value: unknown): string | undefined {
   if (typeof value !== "string") return undefined;
   try {

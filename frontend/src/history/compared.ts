@@ -59,7 +59,7 @@ function useComparedRun(place: PastPlace, running: readonly RunningGraph[], time
   return { run, runs, foreign: run !== null && !runs.has(run) ? run : null };
 }
 
-/** `seq`: the newest moment that the page knows; 0 while it knows of none. */
+/** Keeps what a moment of the past is compared with. `seq`: the newest moment that the page knows, 0 for none. */
 export function useCompared(
   id: string,
   place: PastPlace,
@@ -123,7 +123,7 @@ export function momentsOf(place: PastPlace, known: KnownMoments, newest: number)
   return { from: Math.min(at, other), to: Math.max(at, other) };
 }
 
-/** `Ada · today 14:02`: of whose sitting a moment is; its number where that is not known. */
+/** Returns a moment in words by its sitting, as `Ada · today 14:02`; its number where that is not known. */
 export function momentWords(entries: readonly HistoryEntry[], at: number, now: number): string {
   const entry = entryAt(entries, at) ?? entries.find(({ seq }) => seq === at);
   const when = instant(entry?.until);
@@ -229,7 +229,7 @@ function relation(mine: Relation, other: Relation): Relation {
   return same ? other : { ...mine, waypoints: other.waypoints };
 }
 
-/** `graph`, as far as it says the same as `other` with what is in that. */
+/** Returns `graph` with the objects of `other` wherever both say the same. */
 export function alignedWith(graph: Graph, other: Graph): Graph {
   const keys = new Set(other.actions.map(({ key }) => key));
   const byName = new Map(other.actions.map((each) => [fullName(each), each]));

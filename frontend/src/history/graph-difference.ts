@@ -198,7 +198,10 @@ function withGhosts(
   };
 }
 
-/** `by`: the name of who set something in a thing last, where that is known. */
+/**
+ * Returns the changes from one graph to another. `by`: the name of who set something in a thing last, where that is
+ * known.
+ */
 export function changesBetween(
   before: Graph,
   after: Graph,
@@ -239,7 +242,7 @@ export function changesBetween(
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();
 
-/** `1 card, 2 arrows`: of one kind of change; "" where there is none. */
+/** Returns the number of things with one kind of change, as `1 card, 2 arrows`; "" where there is none. */
 export function countWords(things: readonly ChangedThing[], change: ChangeMark["change"]): string {
   const of = things.filter((each) => !each.looks && each.change === change);
   const count = (thing: ChangedThing["thing"]) => of.filter((each) => each.thing === thing).length;

@@ -170,7 +170,7 @@ function Days({ timeline }: { timeline: Timeline }) {
 
 type HistoryView = "history" | "versions";
 
-/** `above`: what else is there of the graph, as its drafts. */
+/** Shows the history and the versions of a graph. `above`: what else there is of it, as its drafts. */
 export function HistoryPanel({ above }: { above?: ReactNode }) {
   const { id } = useEditorContext();
   const timeline = useTimeline(id);

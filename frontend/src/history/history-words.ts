@@ -20,7 +20,7 @@ const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
 type Done = Pick<HistoryEntry, "kind" | "version" | "adapted" | "merged">;
 type MergedIn = NonNullable<HistoryEntry["merged"]>;
 
-/** `Ben and Mari`, `Ben, Mari and 2 others`. */
+/** Returns names in words, as `Ben and Mari` or `Ben, Mari and 2 others`. */
 export function namesWords(people: readonly VersionAuthor[]): string {
   const names = people.map((person) => isolated(authorName(person)));
   if (names.length > 3) return `${names.slice(0, 2).join(", ")} and ${names.length - 2} others`;

@@ -53,7 +53,10 @@ export function nextPage(page: readonly HistoryEntry[], limit: number): number |
   return (page.findLast(({ from_seq }) => from_seq !== undefined) ?? page.at(-1))?.seq ?? null;
 }
 
-/** `whole`: there is nothing older; else runs from before what is told wait for it. */
+/**
+ * Returns entries of the history and runs in one list, newest first. `whole`: there is nothing older; else runs from
+ * before what is told wait for it.
+ */
 export function timelineOf(
   entries: readonly HistoryEntry[],
   runs: readonly ListedRun[],

@@ -32,7 +32,7 @@ export interface OverwrittenValue {
   readonly stayed: string;
 }
 
-/** `values` as they are asked for, the newest first. */
+/** Returns the values of a field that were overwritten at once. `values`: the newest first. */
 export function overwrittenOf(field: string, values: readonly FieldValue[]): OverwrittenValue[] {
   return values.flatMap((value) =>
     value.overwritten === true
@@ -42,8 +42,8 @@ export function overwrittenOf(field: string, values: readonly FieldValue[]): Ove
 }
 
 /**
- * `values` as they are asked for, the newest first; the spans are in the order of time. Values that were
- * overwritten at once have none.
+ * Returns the values that a field had, oldest first, each with the runs that were started with it. `values`: the
+ * newest first. Values that were overwritten at once have none.
  */
 export function spansOf(
   field: string,
@@ -74,7 +74,7 @@ export function spansOf(
 const endOf = (run: ListedRun): string =>
   run.result === null ? runLabel(run).word : run.result.replace(/^on_/, "");
 
-/** `run 21`, `runs 36–40`, "" without one. */
+/** Returns numbers of runs in words, as `run 21` or `runs 36–40`; "" for none. */
 export function runNumbers(runs: readonly ListedRun[]): string {
   const [first, last] = [runs[0]?.number, runs.at(-1)?.number];
   if (first === undefined) return "";

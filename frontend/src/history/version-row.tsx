@@ -285,7 +285,7 @@ export interface ListedVersion {
   readonly runs: readonly ListedRun[];
 }
 
-/** `versions` and `runs`: the newest first. */
+/** Returns versions with their runs. `versions` and `runs`: the newest first. */
 export function listedVersions(
   versions: readonly Version[],
   runs: readonly ListedRun[],
@@ -321,7 +321,7 @@ function resultCounts(runs: readonly ListedRun[], heard: Heard): ResultCount[] {
   return [...found.values()].sort((a, b) => b.count - a.count);
 }
 
-/** `3 runs: 2 finished, 1 error`. */
+/** Returns the runs of a version in words, as `3 runs: 2 finished, 1 error`. */
 export function runsWords(runs: readonly ListedRun[], heard: Heard): string {
   const [only, ...others] = runs;
   if (only === undefined) return "No run yet";

@@ -20,7 +20,10 @@ export function RestrictedMark() {
   );
 }
 
-/** `brief`: numbers alone, where there is little room; they are told in words all the same. */
+/**
+ * Shows the sizes and problems of a graph. `brief`: numbers alone, where there is little room; they are told in words
+ * all the same.
+ */
 export function GraphCounts({ graph, brief = false }: { graph: GraphSummary; brief?: boolean }) {
   const counts = countsOfListed(graph);
   const words = countWords(counts);

@@ -29,7 +29,7 @@ import { useOpening } from "../ui/late-opening";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
 
-/** "x copy", "x copy 2" …: the first that no graph is called. */
+/** Return the first of "x copy", "x copy 2" … that no graph is called. */
 export function copyName(name: string, taken: readonly string[]): string {
   const stem = `${name || "untitled"} copy`;
   for (let n = 1; ; n += 1) {

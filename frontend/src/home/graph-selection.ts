@@ -31,7 +31,7 @@ export function lastRuns(runs: readonly Run[]): Map<string, Run> {
   return newest;
 }
 
-/** Every word of a search stands somewhere in the texts. */
+/** Return whether every word of a search stands somewhere in the texts. */
 export function matchesSearch(search: string, ...texts: readonly (string | undefined)[]): boolean {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
   const all = texts.join(" ").toLowerCase();

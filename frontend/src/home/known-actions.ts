@@ -70,7 +70,7 @@ interface Placeable {
 }
 
 /**
- * Each name once. Engines look for an action before a graph of its name, so that one of the library
+ * Returns what can be placed, each name once. Engines look for an action before a graph of its name, so that one of the library
  * comes first; one that only graphs use, with the parameters of a graph of its name, is that graph.
  */
 export function placeable(
@@ -123,7 +123,7 @@ export function templatesOf({ actions, graphs }: Placeable): NewAction[] {
   ].reverse();
 }
 
-/** `location, pose.position.x`, for a line under the name. */
+/** Return the inputs of an action for a line under its name, as `location, pose.position.x`. */
 export function signature(template: NewAction): string {
   const names = (template.inputs ?? []).map((input) => pathWords(input.path));
   return names.length === 0 ? "no parameters" : names.join(", ");

@@ -19,7 +19,7 @@ export interface AskedFor {
   readonly url: string;
 }
 
-/** `scope`: where the page lies, as "https://host/temoto/". */
+/** Returns what the service worker does with a request. `scope`: where the page lies, as "https://host/temoto/". */
 export function handlingOf({ method, mode, url }: AskedFor, scope: string): Handling {
   if (method !== "GET" || !url.startsWith(scope)) return "pass";
   const below = url.slice(scope.length).replace(/[?#].*$/, "");

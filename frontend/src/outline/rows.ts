@@ -85,7 +85,10 @@ type PartsOf = (key: Key) => readonly PartOnCard[];
 
 const nothing: PartsOf = () => [];
 
-/** `isOpen` says of an action or outcome, by the id of its row, whether its children are shown. */
+/**
+ * Returns the rows of the outline of a graph. `isOpen` says of an action or outcome, by the id of its row, whether its
+ * children are shown.
+ */
 export function rowsOf(
   graph: Graph,
   isOpen: (id: string) => boolean,

@@ -46,7 +46,7 @@ function AtOwnSize({ children }: { children: React.ReactNode }) {
 
 const same = (at: Position): Position => at;
 
-/** `toView`: where a place on the canvas is drawn. */
+/** Draws the pointers of the others. `toView`: where a place on the canvas is drawn. */
 export function Cursors({ toView = same }: { toView?: (at: Position) => Position }) {
   const people = usePeople();
   const pointing = people.filter(({ presence }) => presence.cursor !== undefined);

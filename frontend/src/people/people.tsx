@@ -22,7 +22,7 @@ export function Name({ of }: { of: { readonly name: string } }) {
   return <bdi className={style.name}>{personName(of)}</bdi>;
 }
 
-/** Each person once, however many windows they have. */
+/** Returns each person once, however many windows they have. */
 export function onePerId<T extends { readonly id: string }>(people: readonly T[]): T[] {
   return [...new Map(people.map((person) => [person.id, person])).values()];
 }

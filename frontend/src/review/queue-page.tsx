@@ -204,7 +204,7 @@ function Found({ queue: { entries, robots } }: { queue: Queue }) {
   );
 }
 
-/** Link to the queue, with how much waits there; nothing while nothing does. */
+/** Links to the queue, with how much waits there; shows nothing while nothing does. */
 export function QueueLink() {
   const { number = 0, yours = 0 } = useLive().now.queue ?? {};
   if (number === 0) return null;

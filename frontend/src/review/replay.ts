@@ -111,7 +111,10 @@ function useRunningTime(
   }, [playing, speed, edge, setAt, setPlaying]);
 }
 
-/** `newest`: the run as it is known now, null without one; `end`: the right edge of its time. */
+/**
+ * Keeps the moment at which a replay stands. `newest`: the run as it is known now, null without one; `end`: the right
+ * edge of its time.
+ */
 export function useReplay<Shown extends Run | null>(
   runner: string | undefined,
   newest: Shown,

@@ -54,7 +54,7 @@ import style from "./run-page.module.css";
 import { RunParameters } from "./run-parameters";
 import { RunPrint } from "./run-print";
 
-/** On a phone the bar has no room for the actions of a page: they stand in a row below it. */
+/** Return whether the actions of the page stand in a row below the bar, which has no room for them on a phone. */
 export function useIsPhone(): boolean {
   return useMediaQuery("(max-width: 600px)", undefined, { getInitialValueInEffect: false });
 }

@@ -1,4 +1,4 @@
-/** For how long the page of whoever runs something on a robot may be missing, as an owner writes it. */
+/** Fields in which an owner writes how long the page of whoever runs something on a robot may be missing. */
 import { Group, NumberInput, Stack, Switch } from "@mantine/core";
 import { useState } from "react";
 import type { PagePresence } from "../api/rights";

@@ -66,8 +66,10 @@ export interface Moving {
 
 const MOVE: ReadonlySet<string> = new Set(["RUNNING", "STOPPING", "PAUSE_REQUESTED"]);
 
-/** The actions of a run that were seen to move, in words, with what was not seen marked. Where something moves inside
- * of an action, that is told, with the way to it, and not the action around it once more. */
+/**
+ * The actions of a run that were seen to move, in words, with what was not seen marked. Where something moves inside
+ * of an action, that is told, with the way to it, and not the action around it once more.
+ */
 export function movingActions(run: Run): string[] {
   const moving = Object.entries(run.actions ?? {}).filter(([, action]) => MOVE.has(action.state));
   const places = placesOf(run);
@@ -128,7 +130,7 @@ function ofRun(run: Run, silent: ReadonlySet<string>): Moving[] {
   });
 }
 
-/** By robot. While the runner is not heard, nothing is known of any of them. */
+/** Return what moves now, sorted by robot. While the runner is not heard, that is unknown for each of them. */
 export function movesNow(now: LiveState): Moving[] {
   const silent = silentRobots(now);
   const runs = openRuns(now).flatMap((run) => ofRun(run, silent));

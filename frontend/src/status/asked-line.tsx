@@ -7,7 +7,10 @@ import { useMayAnswer } from "../api/questions";
 import { isolated } from "../words/isolated";
 import style from "./asked-line.module.css";
 
-/** `below`: it has the width of the page, and is left out where the question itself is. */
+/**
+ * Shows the questions of runs to this person. `below`: the line has the width of the page, and is left out where the
+ * question itself is.
+ */
 export function AskedLine({ below = false }: { below?: boolean }) {
   const [at] = useLocation();
   const { now, runner } = useLive();

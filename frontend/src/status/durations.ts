@@ -22,7 +22,7 @@ function between(least: number, most: number): string {
 
 const EXACT = 1; // ms
 
-/** Null where nothing is known. */
+/** Return a duration between two bounds in words; null where nothing is known. */
 export function boundsText(took: DurationBounds | null | undefined): string | null {
   if (!took) return null;
   const least = took.least * 1000;

@@ -15,8 +15,10 @@ import {
   type Unsure,
 } from "./progress";
 
-/** The way from the outermost graph to one inside: by the names of the graphs below it, as far as nobody knows
- * which of several actions of a name was entered, and then by the very actions that one is inside of. */
+/**
+ * The way from the outermost graph to one inside: by the names of the graphs below it, as far as nobody knows
+ * which of several actions of a name was entered, and then by the very actions that one is inside of.
+ */
 type WayInside =
   | { readonly names: readonly string[]; readonly levels?: readonly string[] }
   | { readonly levels: readonly string[] };
@@ -104,8 +106,10 @@ export function isInRun(run: Run, names: readonly string[]): boolean {
   return [...placesOf(run).values()].some(({ levels }) => isThere(levels, { names }));
 }
 
-/** Progress of the actions of a graph that is drawn inside of the one on the canvas: the actions `levels` lead
- * from there to it, by their full names. */
+/**
+ * Progress of the actions of a graph that is drawn inside of the one on the canvas: the actions `levels` lead
+ * from there to it, by their full names.
+ */
 export function progressBelow(
   { run, unsure, at, names }: RunOnCanvas,
   graph: Pick<Graph, "actions">,
@@ -128,6 +132,7 @@ function isSame(before: Progress | undefined, now: Progress): boolean {
 }
 
 /**
+ * Return the progress of the actions of the graph on the canvas, by their keys; the same map while nothing changes.
  * `at`: the moment at which a replay stands, ms. `inside`: what is shown is a graph inside of the run's. `graph`: what
  * is shown is the graph of the run as people draw it: the run may have opened its sub-graphs.
  */

@@ -171,8 +171,10 @@ export function progressOfAction(
   return progress;
 }
 
-/** Progress by `aid`; actions of sub-graphs, which carry none, are left out. What is told of an action
- * that did not change is the same object again. */
+/**
+ * Progress by `aid`; actions of sub-graphs, which carry none, are left out. What is told of an action
+ * that did not change is the same object again.
+ */
 export function progressByAid(run: Run | null, unsure: Unsure): Map<string, Progress> {
   const found = new Map<string, Progress>();
   if (run === null) return found;
@@ -245,7 +247,7 @@ export function runEndText(run: Run): string {
 
 export type Heard = Pick<LiveState, "link" | "since">;
 
-/** In a word, as it is counted. What has ended stays so, whoever is heard. Pure. */
+/** Return the state of a run in a word: *unknown* while the runner is not heard, unless the run has ended. */
 export function runStatus(run: Run, { link, since }: Heard): { tone: Tone; word: string } {
   if (run.ended_at === null && link === "down") {
     return unknownStatus(serverTimeOf(since));

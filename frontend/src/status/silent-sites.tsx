@@ -3,7 +3,7 @@ import { runnerWords } from "../api/http";
 import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 
-/** `missing`: what is not known of such a site, as "what waits there". */
+/** Names the sites that do not answer. `missing`: what is not known of such a site, as "what waits there". */
 export function SilentSites({ missing }: { missing: string }) {
   const { now } = useLive();
   return silentSites(now).map(({ site }) => (

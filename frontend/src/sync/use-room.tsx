@@ -143,7 +143,7 @@ export function useThrottledGraph(): Graph {
   return useSyncExternalStore(calm.onGraph, source.graph, () => EMPTY_GRAPH);
 }
 
-/** One thing of the graph, say `(graph) => graph.name`; draws again only when it is another. */
+/** Return a part of the graph, say `(graph) => graph.name`; draws again only when it is another. */
 export function useGraphPart<T>(part: (graph: Graph) => T): T {
   const { source } = useRoom();
   const get = () => part(source.graph());
@@ -162,7 +162,7 @@ export function useThrottledLink(): RoomLink {
   return useSyncExternalStore(calm.onLink, room.link);
 }
 
-/** One thing of the link; draws again only when it is another. */
+/** Return a part of the link; draws again only when it is another. */
 export function useLinkPart<T>(part: (link: RoomLink) => T): T {
   const { room, onLink } = useRoom();
   return useSyncExternalStore(onLink, () => part(room.link()));
@@ -254,7 +254,7 @@ export function useEditors(field: string): readonly FieldEditor[] {
   });
 }
 
-/** Whom this page follows, and how to begin and end that. */
+/** Return whom this page follows, and a function that begins and ends that. */
 export function useFollowing() {
   const { following } = useRoom();
   const whom = useSyncExternalStore(following.onChange, following.whom);

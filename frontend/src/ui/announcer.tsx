@@ -41,7 +41,7 @@ export class Announcer {
 
 export const announcer = new Announcer();
 
-/** Once in the page. */
+/** Reads out what `announcer` says, for screen readers; mounted once in the page. */
 export function LiveRegion() {
   const [text, setText] = useState("");
   useEffect(() => announcer.onSay(setText), []);

@@ -19,7 +19,7 @@ interface Props extends DraftOptions {
   area?: React.RefObject<HTMLTextAreaElement | null>;
 }
 
-/** Invalid drafts stay where they are and are explained; the last valid value stays written. */
+/** A text field that writes valid values only. Invalid text stays in the field and is explained. */
 export function DraftInput(props: Props) {
   const { value, lines = false, mono = false } = props;
   const field = useDraft(props);

@@ -18,7 +18,10 @@ export function whenThere(
   });
 }
 
-/** `id`: what stands in `data-field`. A field without anything to write in is shown only. */
+/**
+ * Puts the focus into a field once it is there. `id`: its `data-field`. A field without anything to write in is shown
+ * only.
+ */
 export function focusField(id: string): void {
   // First goes what stands in the place of the form: a list of problems has such fields, too.
   requestAnimationFrame(() => whenThere(`[data-field="${CSS.escape(id)}"]`, focusIn));
@@ -43,7 +46,10 @@ const MEANT = new Set(["Escape", "Tab", "F6"]);
 /** Keys that say nothing by themselves. */
 const HELD = new Set(["Shift", "Control", "Alt", "Meta", "AltGraph", "CapsLock", "NumLock"]);
 
-/** `onRest` is called with the first key that rests. Returns how to end it. */
+/**
+ * Ignores keys after the field with the focus was removed, since they would be shortcuts. `onRest` is called with the
+ * first of them. Returns how to end it.
+ */
 export function restAfterLostFields(onRest: () => void): () => void {
   /** The field in which a person types, or typed until it was removed. */
   let field: HTMLElement | null = null;

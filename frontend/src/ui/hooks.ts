@@ -1,16 +1,19 @@
-/** Hooks about the device (the size of its screen, its search key, and what it keeps for its person), and stable callbacks. */
+/**
+ * Hooks about the device (the size of its screen, its search key, and what it keeps for its person), and stable
+ * callbacks.
+ */
 import { useLocalStorage, useMediaQuery } from "@mantine/hooks";
 import { useCallback, useEffect, useLayoutEffect, useMemo, useRef } from "react";
 import { keyOf } from "./keys";
 
 const AT_ONCE = { getInitialValueInEffect: false };
 
-/** Room for the list, the canvas and the details side by side. */
+/** Return whether there is room for the list, the canvas and the details side by side. */
 export function useIsWide(): boolean {
   return useMediaQuery("(min-width: 1101px)", true, AT_ONCE);
 }
 
-/** One thing at a time. */
+/** Return whether the screen is that of a phone, which shows one thing at a time. */
 export function useIsPhone(): boolean {
   return useMediaQuery("(max-width: 600px)", false, AT_ONCE);
 }
@@ -79,7 +82,7 @@ export function withKept(
   return Object.fromEntries(next.size > 0 ? [...others, [id, [...next]]] : others);
 }
 
-/** `name`: of the place on the device. */
+/** Keeps a set of keys on this device, under `id` in the place `name`. */
 export function useKeptKeys(name: string, id: string) {
   const [kept, keep] = useKept<KeptKeys>(name, {});
   const put = useCallback(

@@ -21,7 +21,7 @@ interface Props {
   part: (button: Button) => ReactElement;
 }
 
-/** From then on the part draws the button: the focus goes over to that one. */
+/** Loads a part at the first press of its button. From then on the part draws the button, which gets the focus. */
 export function LateOpening({ opens, children, part }: Props) {
   const [wanted, setWanted] = useState(false);
   const state = { "aria-haspopup": opens, "aria-expanded": wanted } as const;

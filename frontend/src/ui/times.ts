@@ -9,7 +9,7 @@ export function instant(text: string | null | undefined): number | null {
   return Number.isNaN(at) ? null : at;
 }
 
-/** `0.4 s`, `12.4 s`, `1:12`, `2:05:00`. */
+/** Return a duration of ms in words, as `0.4 s`, `12.4 s`, `1:12` or `2:05:00`. */
 export function duration(ms: number): string {
   const whole = Math.max(0, ms);
   if (whole < 60_000) return `${(whole / 1000).toFixed(1)} s`;
@@ -20,7 +20,7 @@ export function duration(ms: number): string {
   return hours > 0 ? `${hours}:${two(minutes)}:${two(s % 60)}` : `${minutes}:${two(s % 60)}`;
 }
 
-/** For something that goes on: whole seconds, so that it does not flicker. */
+/** Return a duration (ms) that goes on, in whole seconds, so that it does not flicker. */
 export function stopwatch(ms: number): string {
   const s = Math.max(0, Math.floor(ms / 1000));
   return `${Math.floor(s / 60)}:${String(s % 60).padStart(2, "0")}`;
@@ -44,7 +44,7 @@ const minuteFormat = new Intl.DateTimeFormat(undefined, {
   hour12: false,
 });
 
-/** `14:02`: where seconds say nothing. */
+/** Return a time of day without seconds, as `14:02`. */
 export function hourMinute(at: number): string {
   return minuteFormat.format(at);
 }
@@ -58,7 +58,7 @@ export function ago(at: number, now: number): string {
   return day(at, now);
 }
 
-/** `22 Nov 2026`: of papers, which are read on any day. */
+/** Return a date with its year, as `22 Nov 2026`, for what is read on any day. */
 export function dateText(at: number): string {
   return new Date(at).toLocaleDateString(undefined, {
     day: "numeric",
@@ -67,7 +67,7 @@ export function dateText(at: number): string {
   });
 }
 
-/** `today`, `yesterday`, `Mon 3 Nov`. */
+/** Return a day in words, as `today`, `yesterday` or `Mon 3 Nov`. */
 export function day(at: number, now: number): string {
   const midnight = (t: number) => new Date(t).setHours(0, 0, 0, 0);
   const days = Math.round((midnight(now) - midnight(at)) / 86_400_000);

@@ -145,7 +145,7 @@ export interface TooltipPlace {
   readonly below: boolean;
 }
 
-/** To what it tells of, and to the window, px. */
+/** The distance to the element that it tells of, and to the window, px. */
 const GAP = 7;
 const MARGIN = 8;
 /** Its corners are round. */

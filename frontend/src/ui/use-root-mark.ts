@@ -1,7 +1,7 @@
 /** Marks the page's root while something of it is shown that takes room from all the rest. */
 import { useLayoutEffect } from "react";
 
-/** `:has()` at the root would be asked again after every change of anything. */
+/** Sets an attribute at the root element while `on`; `:has()` there would be evaluated after every change of anything. */
 export function useRootMark(name: `data-${string}`, on: boolean): void {
   useLayoutEffect(() => {
     if (!on) return;

@@ -305,7 +305,8 @@ class Postgres:
     ) -> PostgresSession:
         """Lock the database for this process, check that it stores commits durably, bring the
         tables of the branch to this version, and connect. `before` is called if tables are about to
-        change; without `upgrades` they stay as they are."""
+        change; without `upgrades` they stay as they are. Raise CannotStart if the database cannot
+        be used."""
         session = self.own(branch)
         if self._several:
             before = _alone(before)
@@ -434,7 +435,8 @@ class Postgres:
             return await connection.run_sync(question)
 
     async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
-        """Answer a question in one transaction, which sees no later commits of others."""
+        """Call `question` in one read-only transaction, which sees no later commits of others, and
+        return its result."""
         async with self._readers.connect() as connection:
             await connection.execution_options(
                 isolation_level="REPEATABLE READ", postgresql_readonly=True

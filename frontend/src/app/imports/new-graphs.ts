@@ -24,7 +24,7 @@ function chooseFiles(): Promise<File[]> {
   });
 }
 
-/** "task_1", "task_2" …: the first that no graph is called. A name that can be said and found. */
+/** Return the first of "task_1", "task_2" … that no graph is called. */
 export function freshName(taken: readonly string[]): string {
   for (let n = 1; ; n += 1) if (!taken.includes(`task_${n}`)) return `task_${n}`;
 }

@@ -63,7 +63,7 @@ async function take(file: File, folder: string | null): Promise<TakenFile | Know
   }
 }
 
-/** One after the other; `tell` hears how many are done. */
+/** Imports files one after the other; `tell` is called with how many are done. Returns what came of each. */
 export async function takeFiles(
   files: readonly File[],
   tell: (done: number) => void,
@@ -165,7 +165,7 @@ function offerReplacing(known: readonly KnownFile[], after: () => void): void {
   });
 }
 
-/** `after`: the lists are read again. */
+/** Shows what came of an import, and offers to replace known graphs. `after` is called once they are replaced. */
 export function tellTaken({ taken, known, failed }: TakenFiles, after: () => void): void {
   complain(failed);
   offerReplacing(known, after);

@@ -69,7 +69,10 @@ export function inputOf({ code, where }: CheckedProblem): string | null {
   return path ?? null;
 }
 
-/** `misfits`: whether arrows bring the input something that it cannot take, which is a mistake. */
+/**
+ * Returns the kind of a problem. `misfits`: whether arrows bring the input something that it cannot take, which is a
+ * mistake.
+ */
 export function kindOf(
   problem: CheckedProblem,
   misfits: (aid: string, path: string) => boolean = () => false,
@@ -94,7 +97,7 @@ export function countsOf(told: readonly { readonly kind: ProblemKind }[]): Probl
   return { wrong: of("wrong"), fillIn: of("fill-in"), warnings: of("warning") };
 }
 
-/** "1 wrong", "3 to fill in", "2 warnings": those that there are, in this order. */
+/** Returns counts in words, as "1 wrong", "3 to fill in", "2 warnings": those that are not 0, in this order. */
 export function countWords({ wrong, fillIn, warnings }: ProblemCounts): string[] {
   return [
     ...(wrong > 0 ? [`${wrong} wrong`] : []),

@@ -47,7 +47,7 @@ export function heldHeight(wanted: number, room: number): number {
   return Math.round(Math.min(Math.max(LEAST, wanted), Math.max(LEAST, room * MOST)));
 }
 
-/** Before anybody pulled: as sketched where there is room, a quarter of a low screen. */
+/** Return the height of the drawer, px, before anybody pulled it: 302, or a quarter of a low screen (`room`). */
 export function usualHeight(room: number): number {
   return heldHeight(Math.min(302, room * 0.27), room);
 }

@@ -141,7 +141,10 @@ function beganAfter(run: Run, graph: Graph, key: Key, begun: number | null): Beg
   });
 }
 
-/** `sent`: the values that were sent with the run, by full name. */
+/**
+ * Return the values of an action in a run; null if the run has none of it. `sent`: the values that were sent with the
+ * run, by full name.
+ */
 export function valuesOf(
   run: Run,
   graph: Graph,

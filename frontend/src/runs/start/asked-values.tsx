@@ -88,8 +88,8 @@ export interface AskedValues {
 }
 
 /**
- * `before`: values to begin with; `onChange`: they are other ones now. An edit is looked at once the person
- * pauses, and only what was looked at is sent.
+ * Keeps the values that a person gives at a start. `before`: values to begin with; `onChange`: they have changed. An
+ * edit is looked at once the person pauses, and only what was looked at is sent.
  */
 export function useAskedValues(
   graph: string,

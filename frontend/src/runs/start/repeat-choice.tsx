@@ -52,7 +52,10 @@ interface Choice {
   readonly forget: () => void;
 }
 
-/** `moves`: a robot may move, so that a person starts each run; `place`: where typed values are kept. */
+/**
+ * Keeps how often, and with which values, a start is repeated. `moves`: a robot may move, so that a person starts each
+ * run; `place`: where typed values are kept.
+ */
 export function useRepeatChoice(
   asked: readonly AskedInput[],
   moves: boolean,

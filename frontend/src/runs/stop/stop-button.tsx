@@ -10,7 +10,7 @@ import { isolated } from "../../words/isolated";
 import style from "./stop-button.module.css";
 import { drawnStop, graphOnScreen } from "./stop-surroundings";
 
-/** `unknown`: how many robots do not say what they run. */
+/** Return the text beside STOP. `count`: how many runs go on; `unknown`: how many robots do not say what they run. */
 export function stopButtonText(link: LiveLink, count: number, unknown = 0): string {
   if (link === "down") return "state unknown";
   if (link === "connecting") return "asking …";

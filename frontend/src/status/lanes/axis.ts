@@ -152,7 +152,7 @@ function toneOf(visit: Visit, open: boolean, over: boolean): Tone {
   return over ? "unknown" : "run";
 }
 
-/** `until`: as far as anything is known of the run, ms. */
+/** Return the bar of a visit on an axis; null if it lies outside. `until`: as far as the run is known, ms. */
 export function barOf(visit: Visit, axis: TimeAxis, until: number, over: boolean): Bar | null {
   const from = visitBegin(visit);
   if (from === null) return null;

@@ -64,7 +64,7 @@ export interface PresenceSource {
 const INTERVAL_MS = 50;
 const NOTHING: Presence = { selection: [] };
 
-/** `soon` calls back for what changed among the others. */
+/** Shares what this page does with the others, and follows them. `soon` calls back for changes of the others. */
 export function presenceOf(awareness: Awareness, soon: Schedule = immediately): PresenceSource {
   let mine: Presence = NOTHING;
   let sentAt = Number.NEGATIVE_INFINITY;

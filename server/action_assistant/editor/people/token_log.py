@@ -48,7 +48,7 @@ class TokenLog:
 
     @asynccontextmanager
     async def opened(self) -> AsyncIterator[None]:
-        """Give up at the end what is not stored yet."""
+        """Return a context for storing events. Those that are not stored at its end are given up."""
         try:
             yield
         finally:

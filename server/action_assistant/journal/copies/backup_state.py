@@ -47,7 +47,7 @@ class BackupMade(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BackupFailed(msgspec.Struct, frozen=True):
-    """A backup that failed, after the last one that did not."""
+    """A backup that failed, after the last one that did not. `at`: seconds since 1970."""
 
     at: float
     why: str

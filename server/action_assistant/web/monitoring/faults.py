@@ -93,7 +93,7 @@ class FaultWatch:
         self.found: tuple[Fault, ...] = ()
 
     async def run(self) -> None:
-        """Look for ever, until cancelled."""
+        """Look for faults every 15 s until cancelled, and send messages about those that last."""
         while True:
             await self.look()
             await anyio.sleep(_LOOK_S)
