@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.errors import BadInput, Conflict, TooMany
+from action_assistant.journal.events import Draft
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR, Leaves, Order, Registration, unwatched
 from action_assistant.runner.runs.events import Author, Override
@@ -149,6 +150,78 @@ async def test_a_change_of_what_runs_is_asked_for_like_a_start() -> None:
         assert len(david.modified) == 1
         control.stop_all(ANN)
         await until(lambda: not control.open)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{"continue_from": "Work_3"}, {"override": {"codes": ["no_result"], "reason": "I know"}}],
+)
+@virtual
+async def test_a_yes_to_a_version_covers_no_change_that_does_more(more: dict[str, Any]) -> None:
+    class Pausing(Open):
+        pauses = True
+
+    david, first, second = Pausing(NEVER), sequence(), sequence(actions=4)
+    async with careful(Harness(), david) as control:
+        await control.approvals.give(yes(order(first).digest), BEN)
+        run = (await control.start(order(first, engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        await control.approvals.give(yes(order(second).digest), BEN)
+        body = msgspec.json.encode(msgspec.json.decode(change(second)) | more)
+        with pytest.raises(Conflict, match="nobody else has said yes to exactly this start"):
+            await control.modify(run.id, body, ANN)
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+def test_a_change_that_goes_on_elsewhere_says_so_in_its_words() -> None:
+    asked = order(sequence())
+    plain = ordered(asked, asked.digest, (), {})
+    assert plain.going_on("") == plain
+    other = plain.going_on("Work_3")
+    assert other.digest != plain.digest
+    assert ("Goes on", 'from "Work_3", in a running graph') in [
+        (line.what, line.text) for line in other.lines
+    ]
+
+
+@pytest.mark.parametrize(
+    "unseen", list("\u3164\u2800\u115f\ufe0f\u034f\u180b\U000e0100\uffa0\u200b")
+)
+def test_the_words_of_an_order_show_what_nobody_sees(unseen: str) -> None:
+    asked = msgspec.structs.replace(order(sequence()), values={"Work_0": {"place": f"a{unseen}"}})
+    found = [line.text for line in ordered(asked, asked.digest, (), {}).lines]
+    assert not any(unseen in text for text in found)
+    assert any("\\u" in text for text in found)
+
+
+@virtual
+async def test_a_yes_that_is_given_again_where_it_counts_counts() -> None:
+    """Ben says yes in Ann's browser, which counts for nothing, and then in his own."""
+    david, graph = Open(NEVER), sequence()
+    async with careful(Harness(), david) as control:
+        asked = order(graph, engine="David")
+        set_caller(Caller("ann", "1.2.3.4", device="Ann's"))
+        await control.approvals.give(yes(asked.digest), BEN)
+        with pytest.raises(Conflict, match="came from the browser that you use"):
+            await control.start(asked, ANN)
+        set_caller(Caller("ben", "1.2.3.5", device="Ben's"))
+        given = await control.approvals.give(yes(asked.digest), BEN)
+        assert await control.approvals.give(yes(asked.digest), BEN) == given
+        set_caller(Caller("ann", "1.2.3.4", device="Ann's"))
+        assert (await control.start(asked, ANN)).fresh
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_damaged_yes_keeps_no_other_from_counting() -> None:
+    harness = Harness()
+    damaged = Draft(ApprovalGiven.kind, "x", b'{"at": 1}')
+    await harness.journal.append(STREAM, [damaged])
+    approvals = Approvals(harness.journal, clock_us)
+    given = await approvals.give(yes("a" * 64), BEN)
+    assert await approvals.given_for("a" * 64) == (given,)
 
 
 @virtual

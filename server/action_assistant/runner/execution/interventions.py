@@ -30,7 +30,7 @@ from action_assistant.runner.start.admission import (
     prepared,
 )
 from action_assistant.runner.start.approvals import Approvals, Approved
-from action_assistant.runner.start.orders import claim_of, ordered, watched_in
+from action_assistant.runner.start.orders import claim_of, ordered, overridden_in, watched_in
 from action_assistant.runner.start.robot_graphs import not_matched_in, unseen_graphs_in
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.limits import Limits
@@ -128,7 +128,9 @@ async def modify(
         _require_own_sight(asked.sight, ready)
     approved: tuple[Approved, ...] = ()
     if engine is not None:
-        order = ordered(start, ready.digest, (), limits)
+        order = ordered(start, ready.digest, overridden_in(start), limits).going_on(
+            asked.continue_from
+        )
         demand = approvals.demand(order, start, author.id)
         approved = await approvals.require(engine.registration, demand)
         await _require_matched(engine, ready.umrf, run_in_worker)

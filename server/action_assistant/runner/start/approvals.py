@@ -5,6 +5,7 @@ An approval is a person's word about exactly one graph. It stands in a stream of
 taken back, and says nothing about any other graph. Times are microseconds UTC.
 """
 
+import logging
 from collections import defaultdict, deque
 from collections.abc import Iterable
 from typing import Annotated, ClassVar, Final
@@ -13,6 +14,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, TooMany
+from action_assistant.journal.events import Event
 from action_assistant.kit.clock import ClockUs
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.kit.token_bucket import TokenBuckets
@@ -32,6 +34,8 @@ from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import SERVER_OWNER, Person
 from action_assistant.web.auth.rights import Denied, may
 from action_assistant.web.auth.roles import OWNER, Role
+
+log = logging.getLogger(__name__)
 
 #: Said to whoever may not see all graphs of an order.
 HIDDEN_ORDER: Final = (
@@ -172,14 +176,15 @@ class Approvals:
     async def give(
         self, request: ApprovalRequest, author: Author, *, is_named: bool = True
     ) -> ApprovalGiven:
-        """Store an approval. If the same person has approved the graph before, return that earlier
-        approval. `is_named`: the person did not come by a link that several may use. Raise BadInput if
+        """Store an approval. If the same person has approved the graph before with the same browser, by a
+        link of the same kind, return that earlier approval. `is_named`: the person did not come by a link that several may use. Raise BadInput if
         the digest has the wrong form, TooMany if the person approves very many graphs, Unavailable if
         the journal cannot store it."""
         if not _DIGEST.issuperset(request.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
+        by = author.id, caller.device(), is_named
         for known in await self.given_for(request.digest):
-            if known.author.id == author.id:
+            if (known.author.id, known.device, known.is_named is not False) == by:
                 return known
         if not self._given_pace.of(author.id).take():
             raise TooMany("You have said yes to very many graphs; wait some minutes.")
@@ -288,14 +293,20 @@ class Approvals:
         async with self._reading:
             while events := await self._journal.read(STREAM, after=self._seq, limit=500):
                 for event in events:
-                    if event.kind == ApprovalGiven.kind:
-                        given = msgspec.json.decode(event.body, type=ApprovalGiven)
-                        self._by_digest[given.digest].append(given)
-                    elif event.kind == ApprovalAsked.kind:
-                        asked = msgspec.json.decode(event.body, type=ApprovalAsked)
-                        if asked.graph is not None:
-                            self._questions[asked.graph].append(asked)
+                    try:
+                        self._take(event)
+                    except msgspec.MsgspecError as error:
+                        log.error("Approval %s cannot be read: %s", event.seq, error)
                 self._seq = events[-1].seq
+
+    def _take(self, event: Event) -> None:
+        if event.kind == ApprovalGiven.kind:
+            given = msgspec.json.decode(event.body, type=ApprovalGiven)
+            self._by_digest[given.digest].append(given)
+        elif event.kind == ApprovalAsked.kind:
+            asked = msgspec.json.decode(event.body, type=ApprovalAsked)
+            if asked.graph is not None:
+                self._questions[asked.graph].append(asked)
 
     async def look(self, robot: Registration, demand: Demand) -> tuple[Item, Approved] | None:
         """Return the pre-flight item about approval, and the approvals that count; None where the robot asks

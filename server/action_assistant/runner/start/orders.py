@@ -4,6 +4,7 @@ yes to, as a digest and in words. Pure."""
 import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Collection, Iterator
 from datetime import UTC, datetime, timedelta
 from typing import Any, Final, TypeAlias
@@ -105,6 +106,13 @@ class Ordered(msgspec.Struct, frozen=True):
         whole = {name: part for name, part in self.parts.items() if name != "queue"}
         return tuple(dict.fromkeys([self.digest, Ordered(self.tree_digest, whole).digest]))
 
+    def going_on(self, action: str) -> "Ordered":
+        """Return the order of a change of a running graph, after which it goes on from this action; "" where
+        the engine goes on by itself."""
+        if not action:
+            return self
+        return Ordered(self.tree_digest, self.parts | {"continue": action})
+
     @property
     def lines(self) -> tuple[OrderLine, ...]:
         """The order in words: two orders with other digests have other words."""
@@ -174,10 +182,18 @@ def ordered(
 _Words: TypeAlias = Iterator[tuple[str, str]]
 
 
+#: Characters without a form of their own that Python calls printable: fillers, joiners, selectors, blanks.
+_UNSEEN: Final = re.compile(
+    "[\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef]"
+)
+
+
 def _text(value: object) -> str:
     """Return a value as JSON without characters that nobody sees: these turn, or imitate, other words."""
-    text = as_json(value)
-    return "".join(each if each.isprintable() else json.dumps(each)[1:-1] for each in text)
+    return "".join(
+        each if each.isprintable() and not _UNSEEN.match(each) else json.dumps(each)[1:-1]
+        for each in as_json(value)
+    )
 
 
 def _of_values(values: dict[str, dict[str, Any]]) -> _Words:
@@ -283,6 +299,7 @@ _WORDS: Final[dict[str, Callable[[Any], _Words]]] = {
     "override": _of_override,
     "limits": _of_limits,
     "from": _of_beginning,
+    "continue": lambda action: iter([("Goes on", f"from {_text(action)}, in a running graph")]),
     "breakpoints": _of_breakpoints,
     "levels": lambda _: iter([("Sub-graphs", "opened: each action inside is a step of its own")]),
     "script": lambda text: iter(
