@@ -9,6 +9,7 @@ import { useState } from "react";
 import { errorText } from "../api/http";
 import { callUses } from "../api/inside";
 import { counted } from "../words/counted";
+import { isolated } from "../words/isolated";
 
 export interface RenamedUse {
   readonly id: string;
@@ -27,9 +28,12 @@ interface Props {
 
 export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
   const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
+  const [changed, setChanged] = useState<readonly string[]>([]);
   const [busy, setBusy] = useState(false);
   const [wrong, setWrong] = useState("");
-  const chosen = uses.filter(({ id }) => !left.has(id));
+  const open = uses.filter(({ id }) => !changed.includes(id));
+  const chosen = open.filter(({ id }) => !left.has(id));
+  const nameOf = (id: string) => uses.find((use) => use.id === id)?.name || "Untitled";
   const flip = (id: string) => {
     const next = new Set(left);
     if (!next.delete(id)) next.add(id);
@@ -39,9 +43,14 @@ export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
     setBusy(true);
     try {
       const graphs = chosen.map(({ id }) => id);
-      const { changed } = await callUses(graph, { before, name, graphs });
-      notifications.show({ message: `Changed in ${counted(changed.length, "graph")}, too.` });
-      onClose();
+      const done = await callUses(graph, { before, name, graphs });
+      notifications.show({ message: `Changed in ${counted(done.changed.length, "graph")}, too.` });
+      if (!done.refused?.length) return onClose();
+      setChanged([...changed, ...done.changed]);
+      setWrong(
+        done.refused.map(({ graph, why }) => `${isolated(nameOf(graph))}: ${why}`).join(" "),
+      );
+      setBusy(false);
     } catch (error) {
       setWrong(errorText(error));
       setBusy(false);
@@ -55,7 +64,7 @@ export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
           <bdi>“{before}”</bdi> stand for this graph in {counted(uses.length, "graph")}. If you do
           not rename them, they stand for no graph any more.
         </p>
-        {uses.map((use) => (
+        {open.map((use) => (
           <Checkbox
             key={use.id}
             label={<bdi>{use.name || "Untitled"}</bdi>}

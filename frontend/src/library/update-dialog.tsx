@@ -220,6 +220,7 @@ function Use({ use, update, mayEdit }: UseProps) {
 
 function UpdatedGraphs({ done, update }: { done: readonly UpdatedUse[]; update: Update }) {
   const changed = done.filter((each) => each.changed);
+  const refused = done.filter((each) => each.refused);
   if (done.length === 0) return null;
   const nameOf = (graph: string) =>
     update.uses.find((use) => use.graph === graph)?.name || "Untitled";
@@ -240,6 +241,19 @@ function UpdatedGraphs({ done, update }: { done: readonly UpdatedUse[]; update: 
           </li>
         ))}
       </ul>
+      {refused.length > 0 && (
+        <div className={style.conflict} role="alert">
+          {`The update of ${counted(refused.length, "graph")} failed:`}
+          <ul aria-label="Graphs whose update failed">
+            {refused.map(({ graph, refused }) => (
+              <li key={graph}>
+                <bdi>{nameOf(graph)}</bdi>
+                <span>{refused}</span>
+              </li>
+            ))}
+          </ul>
+        </div>
+      )}
     </section>
   );
 }

@@ -366,6 +366,67 @@ async def test_uses_are_updated_in_no_graph_or_in_all_of_them(
                 assert list(text["actions"][0]["input_parameters"]) == ["speed"]
 
 
+@pytest.mark.parametrize("overtaken", [0, 1])
+async def test_of_uses_in_several_graphs_each_that_was_not_updated_says_why(
+    here: EditorHere, owner: httpx.AsyncClient, overtaken: int
+) -> None:
+    action, graphs = await library(owner, "One", "Two", "Three")
+    async with here.services.rooms.enter(graph_stream(graphs[overtaken])) as room:
+        edit = overtaking(Page(room, "eve", 1), times=2 * TRIES)
+
+        async def overtake(at: Room) -> None:
+            if at is room:
+                await edit(at)
+
+        moments = [{"graph": graph, "seq": 1} for graph in graphs]
+        path, body = f"/api/actions/{action}/uses", {"seq": 1, "graphs": moments}
+        with computing(is_quick=False), meanwhile(overtake):
+            answer = await owner.post(path, json=body)
+            if overtaken == 0:
+                assert (answer.status_code, answer.json()["type"]) == (409, "conflict")
+            else:
+                one, two, three = answer.json()
+                assert [each["changed"] for each in (one, two, three)] == [True, False, True]
+                assert two["refused"].startswith("Others have changed this 5 times")
+                assert one["refused"] == three["refused"] == ""
+        texts = [(await owner.get(f"/api/graphs/{graph}/umrf")).json() for graph in graphs]
+        found = [list(text["actions"][0]["input_parameters"]) for text in texts]
+        is_updated = [each == ["speed"] for each in found]
+        assert is_updated == [overtaken == 1, False, overtaken == 1]
+
+
+@pytest.mark.parametrize("overtaken", [0, 1])
+async def test_of_actions_renamed_in_several_graphs_each_that_was_not_says_why(
+    here: EditorHere, owner: httpx.AsyncClient, overtaken: int
+) -> None:
+    graphs = [
+        (await owner.post("/api/graphs", json=file(name))).json()["id"]
+        for name in ("One", "Two", "Three")
+    ]
+    async with here.services.rooms.enter(graph_stream(graphs[overtaken])) as room:
+        edit = overtaking(Page(room, "eve", 1), times=TRIES)
+
+        async def overtake(at: Room) -> None:
+            if at is room:
+                await edit(at)
+
+        body = {"graphs": graphs, "before": "Dock", "name": "Anchor"}
+        with computing(is_quick=False), meanwhile(overtake):
+            answer = await owner.post(f"/api/graphs/{graphs[0]}/uses", json=body)
+        if overtaken == 0:
+            assert (answer.status_code, answer.json()["type"]) == (409, "overtaken")
+        else:
+            (refused,) = answer.json()["refused"]
+            assert answer.json()["changed"] == [graphs[0], graphs[2]]
+            assert refused["graph"] == graphs[1]
+            assert refused["why"].startswith("Others have changed this 5 times")
+        names = [
+            (await owner.get(f"/api/graphs/{graph}/umrf")).json()["actions"][0]["name"]
+            for graph in graphs
+        ]
+        assert [name == "Anchor" for name in names] == [overtaken == 1, False, overtaken == 1]
+
+
 class Bridge(httpx.BaseTransport):
     """Lets a command on a thread ask an editor of this process."""
 

@@ -293,10 +293,13 @@ export interface EditorApi {
     };
     /**
      * CalledUses
-     * @description The graphs in which actions were renamed, each by one edit.
+     * @description The graphs in which actions were renamed, each by one edit; and those in which that failed
+     *     after others were changed.
      */
     CalledUses: {
         changed: string[];
+        /** @default [] */
+        refused?: EditorApi["RefusedUse"][];
     };
     /**
      * CallingUses
@@ -2111,6 +2114,14 @@ export interface EditorApi {
         failed: number;
     };
     /**
+     * RefusedUse
+     * @description A graph of which an edit failed, and why.
+     */
+    RefusedUse: {
+        graph: string;
+        why: string;
+    };
+    /**
      * Rehearsal
      * @description The events of a simulated run, in order. `cut`: the list is incomplete; `asked`: the inputs
      *     for which a start of the graph asks.
@@ -2574,12 +2585,14 @@ export interface EditorApi {
     };
     /**
      * UpdatedGraph
-     * @description A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new.
+     * @description A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new;
+     *     `refused`: why the update of this graph failed, after others were changed; "" if it did not.
      */
     UpdatedGraph: {
         graph: string;
         seq: number;
         changed: boolean;
+        refused: string;
     };
     /**
      * UpdatingUses

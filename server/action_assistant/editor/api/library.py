@@ -201,6 +201,8 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="Bring the uses in some graphs to what the action says: an edit of each, that can be "
         "taken back by its history",
         operation_id="updateUses",
+        description="An error means that no graph was changed. If one was, each graph of which the"
+        " edit failed says why in `refused`.",
         guards=[Needs("edit")],
     )
     async def update_uses(

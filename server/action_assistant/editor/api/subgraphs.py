@@ -8,7 +8,7 @@ from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import SeqOrNone
-from action_assistant.editor.catalogue.catalogue import GraphView, fit
+from action_assistant.editor.catalogue.catalogue import CalledUses, GraphView, fit
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange.edited_text import KeyChange
 from action_assistant.editor.interchange.subgraphs import (
@@ -67,12 +67,6 @@ class CallingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     before: str
     name: str
     graphs: Annotated[tuple[str, ...], msgspec.Meta(max_length=1000)]
-
-
-class CalledUses(msgspec.Struct, frozen=True):
-    """The graphs in which actions were renamed, each by one edit."""
-
-    changed: tuple[str, ...]
 
 
 class FlatCopy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -168,6 +162,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="Give the actions that stand for a graph in others its new name",
         operation_id="callUses",
+        description="An error means that no graph was changed. If one was, the answer names in"
+        " `refused` each graph of which the edit failed.",
         guards=[Needs("edit")],
     )
     async def call_uses(
@@ -177,9 +173,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id, "graph")
         for graph in data.graphs:
             await services.rights.check("graph", graph, identity_of(request), edits=True)
-        return CalledUses(
-            await services.catalogue.call_uses(data.graphs, data.before, data.name, person.id)
-        )
+        return await services.catalogue.call_uses(data.graphs, data.before, data.name, person.id)
 
     return [*_flat(app_state), look_at_extraction, make_subgraph, look_at_unpacking, call_uses]
 

@@ -16,7 +16,7 @@ from action_assistant.editor.interchange import document_edits, importing
 from action_assistant.editor.interchange.document_edits import drafted
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.errors import BadInput, NotFound
+from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
@@ -42,6 +42,21 @@ class DraftOf(msgspec.Struct, frozen=True):
     graph: str
     seq: int
     name: str
+
+
+class RefusedUse(msgspec.Struct, frozen=True):
+    """A graph of which an edit failed, and why."""
+
+    graph: str
+    why: str
+
+
+class CalledUses(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The graphs in which actions were renamed, each by one edit; and those in which that failed
+    after others were changed."""
+
+    changed: tuple[str, ...]
+    refused: tuple[RefusedUse, ...] = ()
 
 
 class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -250,22 +265,28 @@ class Catalogue:
 
     async def call_uses(
         self, graphs: Collection[str], before: str, name: str, author: str
-    ) -> tuple[str, ...]:
+    ) -> CalledUses:
         """Rename the actions called `before` in the graphs with these ids to `name`, by one edit
-        for each graph, after the graph that they stand for was renamed. Return the ids of the
-        graphs that had such an action. Raise NotFound, before anything is written, if a graph does
-        not exist."""
+        for each graph, after the graph that they stand for was renamed. Raise NotFound, before
+        anything is written, if a graph does not exist, and the errors of an edit while no graph is
+        changed."""
         new_name, _ = fit(name, "")
         for graph in graphs:
             await self.require(graph, "graph")
         changed: list[str] = []
+        refused: list[RefusedUse] = []
         for graph in dict.fromkeys(graphs):
-            async with self._rooms.enter(h.graph_stream(graph)) as room:
-                if await server_edits.call_actions(
-                    room, author, before, new_name, run_in_worker=self._run_in_worker
-                ):
-                    changed.append(graph)
-        return tuple(changed)
+            try:
+                async with self._rooms.enter(h.graph_stream(graph)) as room:
+                    if await server_edits.call_actions(
+                        room, author, before, new_name, run_in_worker=self._run_in_worker
+                    ):
+                        changed.append(graph)
+            except Refused as error:
+                if not changed:
+                    raise
+                refused.append(RefusedUse(graph, error.detail))
+        return CalledUses(tuple(changed), tuple(refused))
 
     async def delete(self, graph: str, author: str) -> None:
         """Mark a graph as deleted, and close the sockets of all who have it open."""

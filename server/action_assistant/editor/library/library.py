@@ -170,11 +170,13 @@ class GraphMoment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class UpdatedGraph(msgspec.Struct, frozen=True):
-    """A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new."""
+    """A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new;
+    `refused`: why the update of this graph failed, after others were changed; "" if it did not."""
 
     graph: str
     seq: int
     changed: bool
+    refused: str = ""
 
 
 class LibraryEdits:
@@ -258,8 +260,9 @@ class LibraryEdits:
     ) -> list[UpdatedGraph]:
         """Update the uses of an action in graphs to its parameters after its change `seq`, by one
         edit for each graph. `graphs`: with the change that the person has seen; `renames`:
-        parameters that were renamed. Raise BadInput if a graph is named twice; Conflict, before
-        anything is written, if a graph has changed meanwhile."""
+        parameters that were renamed. Raise BadInput if a graph is named twice; Conflict if a graph
+        has changed meanwhile, and the errors of an edit, while no graph is changed. After that each
+        graph says what came of it."""
         sight = await self._graph_reader.at(action, seq)
         name = (await self._catalogue.get(action)).name
         if len({each.graph for each in graphs}) < len(graphs):
@@ -285,7 +288,7 @@ class LibraryEdits:
             async def updating(known: bytes, each: GraphMoment, state: bytes, seq: int) -> bytes:
                 if seq == each.seq:
                     return known
-                if not updated:
+                if not any(other.changed for other in updated):
                     raise _changed(each, seq)
                 # Others are written already, so this one is updated as it is by now.
                 now = GraphAtSeq(each.graph, seq, state)
@@ -296,7 +299,13 @@ class LibraryEdits:
 
             for each, room, update in updates:
                 compute = partial(updating, update, each)
-                updated.append(await self._adapt(room, each.graph, compute, author, sight, name))
+                try:
+                    found = await self._adapt(room, each.graph, compute, author, sight, name)
+                except Refused as error:
+                    if not any(other.changed for other in updated):
+                        raise
+                    found = UpdatedGraph(each.graph, room.seq, changed=False, refused=error.detail)
+                updated.append(found)
             return updated
 
     async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
