@@ -112,6 +112,18 @@ def start_of(request: str, engine: str) -> dict[str, Any]:
     }
 
 
+def admitted(ask: Callable[[], httpx.Response]) -> httpx.Response:
+    """Ask until the address, from which all of these people come, may try again."""
+
+    def answered() -> httpx.Response | None:
+        answer = ask()
+        return None if answer.status_code == 429 else answer
+
+    answer = until("the address may try again", answered)
+    assert answer is not None
+    return answer
+
+
 class Guest:
     """A browser of a person, who came in by a link."""
 
@@ -123,7 +135,8 @@ class Guest:
             base_url=product.url, headers={"origin": product.url}, trust_env=False, timeout=30
         )
         proof = link["path"].removeprefix("/#i=")
-        answer = self.http.post("/api/session", json={"invitation": proof, "name": name})
+        body = {"invitation": proof, "name": name}
+        answer = admitted(lambda: self.http.post("/api/session", json=body))
         assert answer.status_code == 200, answer.text
         self.id: str = answer.json()["person"]["id"]
 
@@ -389,7 +402,8 @@ class Week:
         url, origin = self.product.url, {"origin": self.product.url}
 
         def send(path: str, **body: str) -> httpx.Response:
-            return httpx.post(f"{url}/api/{path}", json=body, headers=origin, trust_env=False)
+            to = f"{url}/api/{path}"
+            return admitted(lambda: httpx.post(to, json=body, headers=origin, trust_env=False))
 
         claim = send("session/device", code=code["code"]).json()["claim"]
         path = f"/api/devices/codes/{code['id']}/answer"
