@@ -22,9 +22,11 @@ class Proxy:
         self._tasks: set[asyncio.Task[None]] = set()
         self.port = 0
         self.cuts = 0
+        self.delay = 0.0  # seconds until a new connection reaches the server
 
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One connection, until either side ends it."""
+        await asyncio.sleep(self.delay)
         try:
             there, back = await asyncio.open_connection("127.0.0.1", self._target)
         except OSError:

@@ -8,12 +8,14 @@ import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 
+import psutil
 import pytest
 
 from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal import failover
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.failover import Failover, Primary
+from journal.proxy import proxy
 from journal.servers import Replica, Server, binaries, server
 from journal.test_postgres import draft, opened
 
@@ -80,6 +82,29 @@ async def test_what_patroni_says_decides(
         assert (found == "") == (says == "")
 
 
+async def test_a_patroni_whose_answer_never_ends_keeps_no_other_from_being_heard(
+    patroni: str,
+) -> None:
+    gone = asyncio.Event()
+
+    async def trickle(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError):
+            writer.write(b"HTTP/1.1 200 OK\r\ncontent-length: 100000\r\n\r\n")
+            while True:
+                writer.write(b" ")
+                await writer.drain()
+                await asyncio.sleep(0.1)
+        writer.close()
+        gone.set()
+
+    async with await asyncio.start_server(trickle, "127.0.0.1", 0) as endless:
+        port = endless.sockets[0].getsockname()[1]
+        both = Failover((f"http://127.0.0.1:{port}", patroni))
+        async with asyncio.timeout(60):
+            assert "has taken over" in await both.weakness(Primary("two", "42", 2))
+            await gone.wait()
+
+
 async def test_without_an_answer_of_patroni_the_primary_itself_must_wait_for_a_replica() -> None:
     silent = Failover((f"http://{NOBODY}",))
     assert await silent.weakness(Primary("two", "42", 1)) == ""
@@ -104,11 +129,13 @@ def replicated() -> Iterator[tuple[Server, Replica]]:
             replica.stop()
 
 
+@pytest.mark.parametrize("level", ["notice", "error"])
 async def test_a_commit_whose_wait_for_the_replica_was_cancelled_is_not_acknowledged(
-    replicated: tuple[Server, Replica],
+    replicated: tuple[Server, Replica], level: str
 ) -> None:
-    """Postgres answers it with success and a warning."""
+    """Postgres answers it with success and a warning, where nobody has told it to keep that to itself."""
     primary, replica = replicated
+    primary.sql(f"ALTER ROLE aa SET client_min_messages = {level}")
     journal = await opened(f"{primary.url('aa')}?failover=synchronous")
     await journal.append("a", [draft("both have it")])
     replica.freeze()
@@ -123,35 +150,60 @@ async def test_a_commit_whose_wait_for_the_replica_was_cancelled_is_not_acknowle
     await journal.close()
 
 
-async def test_writer_and_readers_leave_an_old_primary_that_lives_on(
-    replicated: tuple[Server, Replica], patroni: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("old", "delay"), [("lives on", 0.0), ("lives on", 0.6), ("is frozen", 0.0)]
+)
+async def test_writer_and_readers_leave_an_old_primary(
+    replicated: tuple[Server, Replica],
+    patroni: str,
+    monkeypatch: pytest.MonkeyPatch,
+    old: str,
+    delay: float,
 ) -> None:
-    """The replica is promoted by force, while the old primary still confirms commits alone."""
+    """The replica is promoted by force, while the old primary still confirms commits alone, or stands
+    still. `delay`: seconds that each new connection to the new primary takes."""
     monkeypatch.setattr(failover, "_WATCH_S", 0.2)
     primary, replica = replicated
     STATE.update(
         database_system_identifier=primary.ask("SELECT system_identifier FROM pg_control_system()"),
         timeline=1,
     )
-    url = f"postgresql://aa@/aa?host=127.0.0.1:{primary.port}&host=127.0.0.1:{replica.port}&patroni={patroni}"
-    journal = await opened(url)
-    await journal.append("a", [draft("both have it")])
-    assert len(await journal.read("a")) == 1  # a reader is connected to the old primary
-    primary.sql("ALTER SYSTEM RESET synchronous_standby_names")
-    primary.sql("SELECT pg_reload_conf()")
-    replica.promote()
-    STATE["timeline"] = 2
-    await asyncio.sleep(1)
-    async with asyncio.timeout(20):
-        while True:
-            with contextlib.suppress(Unavailable):
-                await journal.append("a", [draft("the new one has it")])
-                break
-            await asyncio.sleep(0.1)
-    bodies = [each.body for each in await journal.read("a")]
-    assert bodies == [b"both have it", b"the new one has it"]
-    assert replica.ask("SELECT count(*) FROM event", "aa") == "2"
-    await journal.close()
+    async with contextlib.AsyncExitStack() as ending:
+        way = await ending.enter_async_context(proxy(replica.port, lambda _: "pass"))
+        url = f"postgresql://aa@/aa?host=127.0.0.1:{primary.port}&host=127.0.0.1:{way.port}&patroni={patroni}"
+        journal = await opened(url)
+        ending.push_async_callback(journal.close)
+        await journal.append("a", [draft("both have it")])
+        assert len(await journal.read("a")) == 1  # a reader is connected to the old primary
+        primary.sql("ALTER SYSTEM RESET synchronous_standby_names")
+        primary.sql("SELECT pg_reload_conf()")
+        replica.promote()
+        STATE["timeline"] = 2
+        if old == "is frozen":
+            for each in primary.processes():
+                ending.enter_context(stopped(each))
+        way.delay = delay
+        await asyncio.sleep(1)
+        async with asyncio.timeout(20):
+            while True:
+                with contextlib.suppress(Unavailable):
+                    await journal.append("a", [draft("the new one has it")])
+                    break
+                await asyncio.sleep(0.1)
+        async with asyncio.timeout(20):  # a statement to a frozen server would take longer
+            bodies = [each.body for each in await journal.read("a")]
+        assert bodies == [b"both have it", b"the new one has it"]
+        assert replica.ask("SELECT count(*) FROM event", "aa") == "2"
+
+
+@contextlib.contextmanager
+def stopped(process: psutil.Process) -> Iterator[None]:
+    """Let a process stand still inside the block."""
+    process.suspend()
+    try:
+        yield
+    finally:
+        process.resume()
 
 
 @pytest.mark.parametrize("query", ["failover=synchronous", f"host={NOBODY}"])

@@ -10,11 +10,15 @@ import threading
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple
 from urllib.parse import urlsplit
+from weakref import WeakKeyDictionary
 
 import asyncpg  # type: ignore[import-untyped]
 from sqlalchemy import URL
 from sqlalchemy.dialects.postgresql.asyncpg import PGDialect_asyncpg
+from sqlalchemy.event import listens_for
+from sqlalchemy.exc import DisconnectionError
 from sqlalchemy.ext.asyncio import AsyncEngine, create_async_engine
+from sqlalchemy.pool import ConnectionPoolEntry
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import cause_of
@@ -25,8 +29,12 @@ _SYNCHRONOUS: Final = "synchronous"
 _PATRONI_S: Final = 2.0  # seconds to wait for an answer of Patroni
 _WATCH_S: Final = 5.0  # seconds between two questions about a connection
 _GRACE_S: Final = 0.3  # seconds for a second primary to answer
-#: The timeline of a primary; `pg_control_checkpoint` says it later.
-TIMELINE: Final = "SELECT ('x' || left(pg_walfile_name(pg_current_wal_lsn()), 8))::bit(32)::int"
+_TAKEN_OVER: Final = "another server has taken over from it"
+#: The identifier of the cluster of a primary, and its timeline; `pg_control_checkpoint` says it later.
+IDENTITY: Final = (
+    "(SELECT system_identifier::text FROM pg_control_system()),"
+    " ('x' || left(pg_walfile_name(pg_current_wal_lsn()), 8))::bit(32)::int"
+)
 
 
 class NoPrimary(OSError):
@@ -42,11 +50,29 @@ class Primary(NamedTuple):
     timeline: int
 
 
-class Failover(NamedTuple):
+class _Identity(NamedTuple):
+    """The identifier of a primary's cluster, and its timeline."""
+
+    identifier: str
+    timeline: int
+
+
+class Failover:
     """The way in which one server of a database takes over from another. `patroni`: the addresses of
     Patroni; without any, another manager promotes only a server that has every confirmed commit."""
 
-    patroni: tuple[str, ...]
+    def __init__(self, patroni: tuple[str, ...]) -> None:
+        self.patroni: Final = patroni
+        self._newest: dict[str, int] = {}  # timeline, by the identifier of a cluster
+
+    def note(self, identifier: str, timeline: int) -> None:
+        """Remember that a server of this cluster has begun this timeline: whoever is on an earlier one is an
+        old primary that lives on."""
+        self._newest[identifier] = max(timeline, self._newest.get(identifier, 0))
+
+    def is_old(self, identifier: str, timeline: int) -> bool:
+        """Return whether another server is known to have taken over from a primary."""
+        return timeline < self._newest.get(identifier, 0)
 
     async def weakness(self, primary: Primary) -> str:
         """Return why what this primary confirms could be lost, as a sentence without a full stop; ""
@@ -68,8 +94,11 @@ class Failover(NamedTuple):
             return None
         if any(each.identifier not in {None, primary.identifier} for each in ours):
             return f"a Patroni at {', '.join(self.patroni)} leads another cluster"
-        if any(each.is_primary and each.timeline > primary.timeline for each in ours):
-            return "another server has taken over from it"
+        for each in ours:
+            if each.is_primary:
+                self.note(primary.identifier, each.timeline)
+        if self.is_old(primary.identifier, primary.timeline):
+            return _TAKEN_OVER
         if not any(each.is_synchronous for each in ours):
             return "a failover could lose what it confirms (synchronous_mode of Patroni is off)"
         return ""  # while a primary has no replica, Patroni promotes none
@@ -125,33 +154,55 @@ def hosts_of(url: URL) -> list[str]:
     return [f"{url.host}:{url.port}" if url.port else url.host, *named]
 
 
-def engine_of(url: URL, arguments: Mapping[str, Any], **options: Any) -> AsyncEngine:
+def engine_of(
+    url: URL, arguments: Mapping[str, Any], failover: Failover | None = None, **options: Any
+) -> AsyncEngine:
     """Return an engine that connects to the primary among the hosts of a URL. `arguments`: those of
-    each connection; `options`: those of the engine."""
+    each connection; `failover`: knows which primaries are old; `options`: those of the engine, whose pool
+    hands out no connection to an old primary."""
     url = url.set(drivername="postgresql+asyncpg")
     if len(hosts_of(url)) < 2:
         return create_async_engine(url, connect_args=dict(arguments), **options)
     _, known = PGDialect_asyncpg().create_connect_args(url)  # type: ignore[no-untyped-call]
     hosts = list(zip(known.pop("host"), known.pop("port"), strict=True))
     known |= {"target_session_attrs": "primary", **arguments}
+    servers = [{**known, "host": host, "port": port} for host, port in hosts]
+    found: WeakKeyDictionary[Any, _Identity] = WeakKeyDictionary()
 
     async def connect() -> Any:
-        return await _connected_to_primary(
-            [{**known, "host": host, "port": port} for host, port in hosts]
-        )
+        connection, identity = await _connected_to_primary(servers, failover)
+        found[connection] = identity
+        return connection
 
-    return create_async_engine(url, async_creator=connect, **options)
+    is_pinged = options.pop("pool_pre_ping", False)
+    engine = create_async_engine(url, async_creator=connect, **options)
+
+    @listens_for(engine.sync_engine.pool, "checkout")
+    def check(adapted: Any, record: ConnectionPoolEntry, __: object) -> None:
+        """Refuse a connection to an old primary before it is asked anything: that one may be frozen."""
+        identity = found.get(record.driver_connection)
+        if failover is not None and identity is not None and failover.is_old(*identity):
+            raise DisconnectionError
+        if is_pinged:
+            try:
+                engine.sync_engine.dialect.do_ping(adapted)
+            except Exception as gone:  # whatever it is: another connection is made
+                raise DisconnectionError from gone
+
+    return engine
 
 
-async def _connected_to_primary(servers: Iterable[Mapping[str, Any]]) -> Any:
+async def _connected_to_primary(
+    servers: Iterable[Mapping[str, Any]], failover: Failover | None
+) -> tuple[Any, _Identity]:
     """Connect to all servers at once, and return the connection to the primary: a server that is
     silent must not use up the time of the others. Of two, an old primary that lives on has the lower
-    timeline."""
-    waiting = {asyncio.ensure_future(asyncpg.connect(**each)): _place(each) for each in servers}
-    primaries: dict[Any, int] = {}
+    timeline; one of which it is known is not waited with, and not taken."""
+    waiting = {asyncio.ensure_future(_identified(each)): _place(each) for each in servers}
+    primaries: dict[Any, _Identity] = {}
     chosen: Any = None
     try:
-        left: set[asyncio.Future[Any]] = set(waiting)
+        left: set[asyncio.Future[tuple[Any, _Identity]]] = set(waiting)
         while left:
             done, left = await asyncio.wait(
                 left,
@@ -162,17 +213,31 @@ async def _connected_to_primary(servers: Iterable[Mapping[str, Any]]) -> Any:
                 break
             for each in done:
                 if each.exception() is None:
-                    primaries[each.result()] = await each.result().fetchval(TIMELINE)
+                    connection, identity = each.result()
+                    if failover is None or not failover.is_old(*identity):
+                        primaries[connection] = identity
         if primaries:
-            chosen = max(primaries, key=lambda each: primaries[each])
-            return chosen
-        raise _no_primary({place: each.exception() for each, place in waiting.items()})
+            chosen = max(primaries, key=lambda each: primaries[each].timeline)
+            return chosen, primaries[chosen]
+        raise _no_primary(
+            {place: each.exception() or NoPrimary(_TAKEN_OVER) for each, place in waiting.items()}
+        )
     finally:
         for each in waiting:
             each.cancel()
         for other in await asyncio.gather(*waiting, return_exceptions=True):
-            if isinstance(other, asyncpg.Connection) and other is not chosen:
-                other.terminate()
+            if isinstance(other, tuple) and other[0] is not chosen:
+                other[0].terminate()
+
+
+async def _identified(server: Mapping[str, Any]) -> tuple[Any, _Identity]:
+    """Connect to a primary, and return the connection with what the primary says of itself."""
+    connection = await asyncpg.connect(**server)
+    try:
+        return connection, _Identity(*await connection.fetchrow(f"SELECT {IDENTITY}"))
+    except BaseException:
+        connection.terminate()
+        raise
 
 
 def _no_primary(faults: Mapping[str, BaseException | None]) -> NoPrimary:
@@ -198,7 +263,7 @@ async def _asked(address: str) -> _Answer | None:
     import httpx  # slow to load, and only clusters need it
 
     try:
-        async with httpx.AsyncClient(timeout=_PATRONI_S) as client:
+        async with asyncio.timeout(_PATRONI_S), httpx.AsyncClient(timeout=_PATRONI_S) as client:
             state = (await client.get(f"{address}/patroni")).json()
             settings = (await client.get(f"{address}/config")).raise_for_status().json()
         return _Answer(

@@ -10,10 +10,8 @@ from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
 from sqlalchemy import URL, Connection, NullPool, func, make_url, select
-from sqlalchemy.event import listens_for
-from sqlalchemy.exc import DBAPIError, DisconnectionError, SQLAlchemyError
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
-from sqlalchemy.pool import ConnectionPoolEntry
 from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
@@ -21,7 +19,7 @@ from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Before, Branch, Overtaken, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.failover import (
-    TIMELINE,
+    IDENTITY,
     Failover,
     Primary,
     Watch,
@@ -91,10 +89,7 @@ _STORE_SHARED: Final = _STORE_TEXT.format(
 #: A commit that waits for the replica: once it is confirmed, the replica has all that came before, also a
 #: commit whose wait ended with its connection, and that would be lost in a failover (decision 168).
 _BARRIER: Final = "SELECT pg_logical_emit_message(true, 'action-assistant', '')"
-_PRIMARY: Final = (
-    "SELECT current_setting('synchronous_standby_names'),"
-    f" (SELECT system_identifier::text FROM pg_control_system()), ({TIMELINE})"
-)
+_PRIMARY: Final = f"SELECT current_setting('synchronous_standby_names'), {IDENTITY}"
 #: Commits that a failover keeps: they wait for the replica's disk.
 _KEPT: Final = frozenset({"on", "remote_apply"})
 #: Connections of an earlier session of this process that the server has not ended yet.
@@ -114,6 +109,10 @@ _HELD: Final = (
 _EDITORS: Final = f"SELECT count(*) {_HELD}"
 #: The condition that a session holds a slot, to be formatted with the slot.
 HELD_SLOT: Final = f"EXISTS (SELECT 1 {_HELD} AND objid = ({{}})::oid)"
+#: Levels of messages at which a commit tells that its wait for the replica was cancelled.
+_WARNING: Final = frozenset(
+    {"debug5", "debug4", "debug3", "debug2", "debug1", "log", "notice", "warning"}
+)
 _END_OLD: Final = """
 SELECT pg_terminate_backend(pid) FROM pg_stat_activity
 WHERE application_name = $1 AND pid <> pg_backend_pid()
@@ -278,27 +277,11 @@ class Postgres:
         self.address: Final = url.set(drivername="postgresql").render_as_string(hide_password=False)
         self._me = f"action-assistant {os.getpid()} {secrets.token_hex(8)}"
         self._key = 0
-        self._connects = 0  # of the writer
         self._readers = self._engine(
             {"application_name": f"{self._me} reads", "default_transaction_read_only": "on"},
             pool_size=_READERS,
             pool_pre_ping=True,
         )
-        if self._failover is not None:
-            self._let_readers_follow()
-
-    def _let_readers_follow(self) -> None:
-        """Let no connection of readers outlive that of the writer: it may be to an old primary."""
-        pool = self._readers.sync_engine.pool
-
-        @listens_for(pool, "connect")
-        def note(_: object, record: ConnectionPoolEntry) -> None:
-            record.info["connects"] = self._connects
-
-        @listens_for(pool, "checkout")
-        def check(_: object, record: ConnectionPoolEntry, __: object) -> None:
-            if record.info["connects"] != self._connects:
-                raise DisconnectionError
 
     def open(
         self, branch: Branch, before: Before = no_copy, *, upgrades: bool = True
@@ -336,7 +319,7 @@ class Postgres:
         Raise CannotStart if the database cannot be used."""
 
         async def change() -> T:
-            engine = engine_of(self._url, {}, poolclass=NullPool)
+            engine = engine_of(self._url, {}, self._failover, poolclass=NullPool)
             try:
                 async with engine.begin() as connection:
                     await connection.exec_driver_sql("SELECT pg_advisory_xact_lock(7205759403)")
@@ -355,9 +338,8 @@ class Postgres:
         or never will."""
         server = {"application_name": self._me}
         if self._failover is not None:
-            server["synchronous_commit"] = (
-                "on"  # whatever the server is told while we are connected
-            )
+            # Whatever the server is told while we are connected.
+            server |= {"synchronous_commit": "on", "client_min_messages": "warning"}
         engine = self._engine(server, poolclass=NullPool)
         session = PostgresSession(engine, self._take_over, is_shared=self._several)
         session.slot = self._slot
@@ -380,7 +362,7 @@ class Postgres:
         if self._failover is None or primary is None:
             return None
         await raw.execute(_BARRIER)
-        self._connects += 1  # readers follow
+        self._failover.note(primary.identifier, primary.timeline)  # readers follow
         return Watch(self._failover, primary)
 
     async def _take_slot(self, raw: Any) -> None:
@@ -409,6 +391,11 @@ class Postgres:
         if commit not in _KEPT:  # a pooler may drop the setting of this session
             raise Unfit(
                 f"it confirms commits before its replica has them (synchronous_commit is {commit})"
+            )
+        told = await raw.fetchval("SELECT current_setting('client_min_messages')")
+        if told not in _WARNING:
+            raise Unfit(
+                f"it does not say that a commit was not waited for (client_min_messages is {told})"
             )
         primary = Primary(*await raw.fetchrow(_PRIMARY))
         if why := await self._failover.weakness(primary):
@@ -481,7 +468,9 @@ class Postgres:
             "server_settings": server,
         }
         # This module sends BEGIN and COMMIT itself.
-        return engine_of(self._url, arguments, isolation_level="AUTOCOMMIT", **options)
+        return engine_of(
+            self._url, arguments, self._failover, isolation_level="AUTOCOMMIT", **options
+        )
 
     @property
     def _the(self) -> str:
@@ -496,7 +485,9 @@ def beside(url: str, name: str, *, size: int, patience: float) -> AsyncEngine:
     if failover is not None:
         server["synchronous_commit"] = "on"
     arguments = {"timeout": patience, "command_timeout": patience, "server_settings": server}
-    return engine_of(parsed, arguments, pool_size=size, max_overflow=0, pool_pre_ping=True)
+    return engine_of(
+        parsed, arguments, failover, pool_size=size, max_overflow=0, pool_pre_ping=True
+    )
 
 
 def weakness(connection: Connection, failover: Failover | None) -> str:
