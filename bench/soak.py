@@ -46,11 +46,22 @@ class Part(NamedTuple):
 
 PARTS: Final[dict[str, Part]] = {
     "reported": Part(
-        "200 histories of a hardware stop that is reported; a grid of 60 runs of which one fails",
-        {"TEST_STOP_HISTORIES": "200", "TEST_LONG": "1"},
+        "200 histories each of a hardware stop that is reported, of pages that have to be visible, and of "
+        "limits; a grid of 60 runs of which one fails",
+        {
+            "TEST_STOP_HISTORIES": "200",
+            "TEST_PAGE_HISTORIES": "200",
+            "TEST_LIMIT_HISTORIES": "200",
+            "TEST_LONG": "1",
+        },
         (
             *("-s", "tests/runner/execution/test_hardware_stops.py"),
-            *("tests/runner/repeats/test_repeats.py", "-k", "random_histories or sixty"),
+            *(
+                "tests/runner/execution/test_operator_pages.py",
+                "tests/runner/execution/test_led_limits.py",
+            ),
+            *("tests/runner/repeats/test_repeats.py", "-k"),
+            "random_histories or sixty or page_is_missing or no_value_outside",
         ),
     ),
     "parquet": Part(

@@ -16,6 +16,7 @@ import { errorText, runnerWords } from "../api/http";
 import { CONDUCTED, enginesOf } from "../api/led-runs";
 import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
+import { useRepeats } from "../api/repeats";
 import {
   filterOf,
   importExamples,
@@ -138,6 +139,18 @@ function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsP
   );
 }
 
+/** Link to the repeats; nothing while there are none. */
+function RepeatsLink() {
+  const { runner } = useLive();
+  const found = useRepeats(runner);
+  if (!found.data?.length) return null;
+  return (
+    <Button component={Link} to="/runs/repeats" size="compact-sm" variant="subtle">
+      Repeats
+    </Button>
+  );
+}
+
 export function RunsPage() {
   const { runner, now } = useLive();
   const [, go] = useLocation();
@@ -166,9 +179,7 @@ export function RunsPage() {
           <RunFilters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
         </div>
         <div className={style.buttons} aria-live="polite">
-          <Button component={Link} to="/runs/repeats" size="compact-sm" variant="subtle">
-            Repeats
-          </Button>
+          <RepeatsLink />
           <QueueLink />
           {waiting > 0 && (
             <Button size="compact-sm" variant="light" onClick={() => void listed.refetch()}>

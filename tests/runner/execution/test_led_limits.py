@@ -1,5 +1,6 @@
 """Limits in led runs: each piece is held to those of its robot as it leaves."""
 
+import os
 import random
 from typing import Any
 
@@ -24,6 +25,8 @@ from runner.execution.test_conductor import led
 from runner.execution.test_questions import asked_of, asking, line, open_question
 from runner.harness import ANN, ended, until, virtual
 from umrf.test_limits import task
+
+HISTORIES = int(os.environ.get("TEST_LIMIT_HISTORIES", "20"))
 
 TORQUE = parameter("torque", "number")
 TORQUES = parameter("torque", "numbers")
@@ -114,7 +117,7 @@ async def test_a_literal_outside_a_limit_refuses_the_start_of_a_led_run() -> Non
 @virtual
 async def test_no_value_outside_a_limit_ever_leaves() -> None:
     """Random torques of three actions, with a limit that an owner sets at a random moment."""
-    for seed in range(20):
+    for seed in range(HISTORIES):
         pick = random.Random(seed)
         values = [pick.choice([59.0, 60.0, 60.1, 200.0]) for _ in range(2)]
         most = pick.choice([60, 100])
