@@ -80,7 +80,10 @@ export interface RequestOptions {
 const PATIENCE = 20_000; // ms
 const SESSION = "/api/session";
 
-/** Return whether the editor knows this session; "unsure" if it does not answer. */
+/**
+ * Return whether the editor knows this session; "unsure" if it does not answer.
+ * If it does not, the page hears that the session has ended.
+ */
 export async function isSignedIn(): Promise<"yes" | "no" | "unsure"> {
   const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(5_000) };
   const answer = await fetch(serverPath(SESSION), init).catch(() => null);

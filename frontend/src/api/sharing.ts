@@ -6,11 +6,15 @@ import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 
 export type Guest = EditorApi["Guest"];
-/** `path` follows the origin of the page, and is absent once the link is revoked. `unrecorded`: nobody
- * comes in by it any more, though the log could not take that up yet. */
+/**
+ * `path` follows the origin of the page, and is absent once the link is revoked. `unrecorded`: nobody
+ * comes in by it any more, though the log could not take that up yet.
+ */
 export type Invitation = EditorApi["Invitation"];
-/** `origins`: where others find the page, the likeliest first; empty when they cannot. `proxied`: the
- * first of these is shown by a proxy, whose certificate that is. */
+/**
+ * `origins`: where others find the page, the likeliest first; empty when they cannot. `proxied`: the
+ * first of these is shown by a proxy, whose certificate that is.
+ */
 export type Sharing = EditorApi["Sharing"];
 
 const KEY = ["invitations"] as const;
@@ -58,7 +62,7 @@ export function useRevoke(runner: string | undefined) {
   });
 }
 
-/** The code of a link as a picture. */
+/** Return the address of a picture (QR code) of an invitation. `origin`: where it leads, as "https://host:port". */
 export function codeUrl(invitation: string, origin: string): string {
   const path = `/api/invitations/${encodeURIComponent(invitation)}/qr`;
   return serverPath(`${path}?origin=${encodeURIComponent(origin)}`);

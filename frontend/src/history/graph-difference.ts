@@ -242,7 +242,10 @@ export function changesBetween(
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();
 
-/** Returns the number of things with one kind of change, as `1 card, 2 arrows`; "" where there is none. */
+/**
+ * Returns the number of things with one kind of change, as `1 card, 2 arrows`, without
+ * changes of looks; "" where there is none.
+ */
 export function countWords(things: readonly ChangedThing[], change: ChangeMark["change"]): string {
   const of = things.filter((each) => !each.looks && each.change === change);
   const count = (thing: ChangedThing["thing"]) => of.filter((each) => each.thing === thing).length;

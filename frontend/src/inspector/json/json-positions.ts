@@ -80,7 +80,7 @@ function* blocks(lines: readonly string[]): Generator<Lines> {
   }
 }
 
-/** Returns the line to which a JSON pointer (RFC 6901) leads, or the last one on the way there. */
+/** Returns the line, from 0, to which a JSON pointer (RFC 6901) leads, or the last one on the way there. */
 export function lineOf(text: string, path: string): number {
   return text.slice(0, pointedAt(text, path)).split("\n").length - 1;
 }
