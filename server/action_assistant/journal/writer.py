@@ -116,10 +116,9 @@ class Transaction:
             _check_text(each.kind)
             _check_text(each.author)
         head = self._head(stream)
-        if self._session.is_shared and self._refusal(addition, head):
-            head = self._head_again(stream)
-        if refusal := self._refusal(addition, head):
-            raise Conflict(refusal)
+        expected = addition.expected
+        if addition.epoch is not None or (expected is not None and expected != head.seq):
+            head = self._confirmed(addition, head)
         at, seq, chain = utc_us(), head.seq, head.chain
         for draft in addition.drafts:
             seq += 1
@@ -206,6 +205,21 @@ class Transaction:
             for event, chain in events:
                 self._stored[event.stream] = Head(event.seq, chain)
 
+    def _confirmed(self, addition: Addition, head: Head) -> Head:
+        """Return the end of the stream of an addition, `head` as it is remembered. In a shared database
+        another process may have moved it: it is read again before the addition is refused, unless events wait
+        for it in this transaction, which are compared with the database when they are stored. Raise Conflict
+        if the addition was made for another end or epoch."""
+        stream = addition.stream
+        refusal = self._refusal(addition, head)
+        if refusal and self._session.is_shared and head == self._stored[stream]:
+            del self._heads[stream]
+            head = self._head(stream)
+            refusal = self._refusal(addition, head)
+        if refusal:
+            raise Conflict(refusal)
+        return head
+
     def _refusal(self, addition: Addition, head: Head) -> str:
         """Return why an addition was not made for the end of its stream (`head`); "" if it was."""
         stream, expected = addition.stream, addition.expected
@@ -214,14 +228,6 @@ class Transaction:
         if addition.epoch is not None and addition.epoch != self._epochs.get(stream):
             return f"Another process owns {stream} now."
         return ""
-
-    def _head_again(self, stream: str) -> Head:
-        """Return the end of a stream as the database has it now: in a shared one another process may have
-        moved it since it was read. Events that wait in this transaction were made for the end that was
-        read, and are compared with it when they are stored."""
-        if self._heads[stream] == self._stored[stream]:
-            del self._heads[stream]
-        return self._head(stream)
 
     def _head(self, stream: str) -> Head:
         head = self._heads.get(stream)
