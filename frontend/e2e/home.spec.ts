@@ -184,3 +184,24 @@ test("of many graphs a page is loaded, more by keys, and a search finds what is 
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("while a graph is opening it has the name that its list said, or none", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  const id = await product.chain(1);
+  await page.goto(product.url);
+  const link = page.getByRole("article").filter({ hasText: "chain_1" }).getByRole("link").first();
+  await expect(link).toBeVisible();
+  // Its room gives no answer yet.
+  await page.routeWebSocket(new RegExp(id), () => {});
+  await link.click();
+  await expect(page).toHaveURL(new RegExp(id));
+  const where = page.getByRole("navigation", { name: "Where you are" });
+  await expect(where).toContainText("chain_1");
+  await page.reload();
+  await expect(where).toBeVisible();
+  await expect(where).not.toContainText("Untitled");
+  expect(failures).toEqual([]);
+  await context.close();
+});

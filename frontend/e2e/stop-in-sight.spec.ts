@@ -1,7 +1,7 @@
 /** STOP is in sight on each page, at each width, whatever goes on; and it outlives the page around it. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { saved } from "./canvas";
+import { atRest, boxOf, saved } from "./canvas";
 import { LONG, Product } from "./product";
 import { post } from "./valves";
 
@@ -167,6 +167,88 @@ test("STOP is inside the screen and under nothing: each page, each width, idle, 
   await stateIs("stopped");
   await zoom.send("Emulation.setPageScaleFactor", { pageScaleFactor: 1 });
   await inSight(page, routes, "idle", OTHER_WIDTHS);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+/** Where the parts of a page begin and end, and the controls that what is said of Stop lies on. */
+function partsOf(page: Page): Promise<{ parts: string[]; under: string[] }> {
+  return page.evaluate(() => {
+    const boxOf = (each: Element) => each.getBoundingClientRect();
+    const parts = document.querySelectorAll(
+      "main, main h1, main aside, .react-flow, [role=toolbar]",
+    );
+    const said = document.querySelector("#stop [role=alert]");
+    const over = (each: Element) => {
+      const [a, b] = [boxOf(said ?? each), boxOf(each)];
+      const apart =
+        a.right <= b.left || a.left >= b.right || a.bottom <= b.top || a.top >= b.bottom;
+      return said !== null && !apart;
+    };
+    const controls = document.querySelectorAll("main :is(button, input, a, h1)");
+    return {
+      parts: [...parts].map((each) => {
+        const { x, y, right } = boxOf(each);
+        return `${each.tagName} ${each.ariaLabel ?? ""} ${[x, y, right].map(Math.round)}`;
+      }),
+      under: [...controls]
+        .filter((each) => each.checkVisibility() && each.closest(".react-flow") === null)
+        .filter(over)
+        .map((each) => each.ariaLabel ?? each.textContent ?? ""),
+    };
+  });
+}
+
+test("what is said of Stop moves nothing of a page, and lies on no control beside a canvas", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada", { panels: "folded" });
+  const graph = await product.chain(3);
+  const canvases = [`/graphs/${graph}`, `/runs/${await running(page, graph)}`];
+  const seen = async () => {
+    const found = new Map<string, Awaited<ReturnType<typeof partsOf>>>();
+    for (const route of [...canvases, "/", "/runs", "/robots", "/actions"]) {
+      await go(page, route);
+      for (const width of [1440, 1200, 834]) {
+        await page.setViewportSize({ width, height: 900 });
+        await atRest(page);
+        found.set(`${route} ${width}`, await partsOf(page));
+      }
+    }
+    return found;
+  };
+  const before = await seen();
+  const runner = product.pid("runner");
+  process.kill(runner, "SIGSTOP");
+  try {
+    const said = page.getByRole("region", { name: "Stop" }).getByRole("alert");
+    await expect(said).toContainText("STOP MAY REACH NOBODY");
+    const after = await seen();
+    await expect(said).toBeVisible();
+    for (const [where, { parts, under }] of after) {
+      expect(parts, where).toEqual(before.get(where)?.parts);
+      if (canvases.some((route) => where.startsWith(route))) expect(under, where).toEqual([]);
+    }
+    // The search has the upper edge, and keeps it.
+    await go(page, canvases[0] ?? "");
+    await page.keyboard.press("Control+f");
+    const search = page.getByRole("search", { name: "Find in graph" });
+    const [bar, notice] = [await boxOf(search), await boxOf(said)];
+    expect(notice.y).toBeGreaterThan(bar.y + bar.height);
+    await page.keyboard.press("Escape");
+    // So has a dialog, which leaves room below.
+    await page.keyboard.press("Control+k");
+    const dialog = page.getByRole("dialog");
+    const [box, below] = [await boxOf(dialog), await boxOf(said)];
+    expect(below.y).toBeGreaterThanOrEqual(box.y + box.height);
+    await page.keyboard.press("Escape");
+  } finally {
+    process.kill(runner, "SIGCONT");
+  }
+  await page
+    .getByRole("button", { name: /^Stop / })
+    .first()
+    .click();
   expect(failures).toEqual([]);
   await context.close();
 });

@@ -202,7 +202,7 @@ function Filters({ filter, onChange }: FiltersProps) {
     <search className={style.filters} aria-label="Filter the audit">
       <TextInput
         label="Words"
-        placeholder="Name, text, address"
+        placeholder="Name, address"
         leftSection={<IconSearch size={15} aria-hidden />}
         value={text}
         onChange={(event) => {

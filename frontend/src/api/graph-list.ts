@@ -1,9 +1,11 @@
 /** The list of graphs by pages, as the server sorts and searches it; and all names and labels. */
 import {
+  type InfiniteData,
   keepPreviousData,
   type QueryClient,
   useInfiniteQuery,
   useQuery,
+  useQueryClient,
 } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { editor } from "./client";
@@ -102,6 +104,16 @@ export function useGraphPages(wanted: GraphsWanted): GraphPages {
       if (found.hasNextPage && !found.isFetchingNextPage) void found.fetchNextPage();
     },
   };
+}
+
+/** Return the name of a graph in the lists that the page has loaded; undefined if it is in none. */
+export function useListedName(id: string): string | undefined {
+  const client = useQueryClient();
+  return useMemo(() => {
+    const lists = client.getQueriesData<InfiniteData<GraphPage>>({ queryKey: queryKeys.pages });
+    const all = lists.flatMap(([, data]) => data?.pages?.flatMap(({ graphs }) => graphs) ?? []);
+    return all.find((graph) => graph.id === id)?.name;
+  }, [client, id]);
 }
 
 /**

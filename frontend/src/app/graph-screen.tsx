@@ -326,7 +326,7 @@ function Lists({ create, choose }: Pick<ReturnType<typeof useNewGraphs>, "create
 function TitledBar(parts: Omit<ComponentProps<typeof PageBar>, "graph">) {
   const { id } = useEditorSummary();
   const here = parts.crumbs.find(({ to, part }) => to === undefined && !part)?.label;
-  useTitle(typeof here === "string" ? here : "Graph");
+  useTitle((typeof here === "string" && here) || "Graph");
   return <PageBar graph={id} {...parts} />;
 }
 

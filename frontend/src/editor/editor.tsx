@@ -11,6 +11,7 @@ import {
   useState,
 } from "react";
 import { useSearch } from "wouter";
+import { useListedName } from "../api/graph-list";
 import { NameOfGraph } from "../canvas/editor-store";
 import { addressAround, levelsOf } from "../canvas/level-path";
 import { FoldFrameContext, type NoteLinks, NoteLinksContext } from "../canvas/notes/note-buttons";
@@ -91,8 +92,16 @@ function EditorContextProvider({ context, children }: ProviderProps) {
   );
 }
 
+/** Return the name of the graph; while it is loading that of the lists, or none. */
+function useShownName(id: string, { name, actions }: Graph, drawn: boolean): string {
+  const listed = useListedName(id) ?? "";
+  const isHere = drawn || actions.length > 0;
+  return name || (isHere ? "Untitled" : listed);
+}
+
 function crumbsOf(
   context: EditorContext,
+  name: string,
   search: string,
   rename: (name: string) => boolean,
 ): Crumb[] {
@@ -105,8 +114,8 @@ function crumbsOf(
       to: addressAround(search, n) ?? "/",
     })),
     {
-      label: context.graph.name || "Untitled",
-      ...(context.mayEdit && { rename }),
+      label: name,
+      ...(context.mayEdit && name !== "" && { rename }),
     },
     ...(action && others.length === 0
       ? [{ label: endName(context.graph, action.key), part: true }]
@@ -339,12 +348,13 @@ function barParts(
   context: EditorContext,
   summary: EditorSummary,
   told: readonly ProblemGroup[],
+  name: string,
   search: string,
   rename: (name: string) => boolean,
 ): EditorBarParts {
   const drawn = summary.seq > 0;
   return {
-    crumbs: crumbsOf(context, search, rename),
+    crumbs: crumbsOf(context, name, search, rename),
     status: (
       <>
         <Later drawn={drawn}>
@@ -398,6 +408,7 @@ export function Editor(props: Props) {
   const link = useThrottledLink();
   const drawn = link.seq > 0;
   const rename = useRenameGraph(context);
+  const name = useShownName(id, context.graph, drawn);
   const { problems, told, marks } = useProblemGroups(id, link.seq, context.graph);
   const threads = useThreads();
   useOpenThreadsOnCards(threads);
@@ -463,7 +474,7 @@ export function Editor(props: Props) {
   return (
     <EditorContextProvider context={context}>
       <EditorSummaryContext value={summary}>
-        <props.Bar {...barParts(props, context, summary, told, search, rename)} />
+        <props.Bar {...barParts(props, context, summary, told, name, search, rename)} />
         {phone ? (
           <PhoneLayout
             {...{ ...parts, drawn, start: props.start, held: props.held, sign: props.sign }}

@@ -125,13 +125,13 @@ export function FindBar({ problems, onClose }: Props) {
   };
   const none = asked.trim() !== "" && hits.length === 0;
   return (
-    <search className={style.bar} aria-label="Find in graph">
+    <search className={style.bar} aria-label="Find in graph" data-find-bar>
       <div className={style.row}>
         <TextInput
           ref={field}
           className="fill"
           aria-label="Find in graph"
-          placeholder="Name, robot, value, response, problem …"
+          placeholder="Name, robot, value …"
           leftSection={<IconSearch size={15} aria-hidden />}
           role="combobox"
           aria-expanded={hits.length > 0}

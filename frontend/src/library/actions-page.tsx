@@ -184,7 +184,7 @@ export function ActionsPage(props: Props) {
         )}
       </aside>
       {(!phone || open) && (
-        <div className="min-w-0 min-h-0 relative bg-panel overflow-y-auto">
+        <div className={`${style.pane} min-w-0 min-h-0 relative bg-panel overflow-y-auto`}>
           {phone && (
             <Button
               component={Link}

@@ -99,7 +99,7 @@ function NewToken({ mostDays }: { mostDays: number }) {
             <TextInput
               flex={1}
               label="Name of the program"
-              placeholder="nightly tests, Prometheus …"
+              placeholder="nightly tests"
               maxLength={60}
               value={name}
               error={make.isError ? errorText(make.error) : undefined}

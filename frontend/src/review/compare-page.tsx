@@ -32,6 +32,7 @@ import {
   causeSentence,
   differenceCount,
   differencesOf,
+  engineDifference,
   outermostAid,
   sameAsSeen,
   spokenOf,
@@ -97,13 +98,12 @@ function Verdict({ found }: { found: Comparison }) {
 }
 
 function Before({ found }: { found: Comparison }) {
+  const engines = engineDifference(found);
   return (
     <section>
       <h2>Before they began</h2>
-      {!found.same_engine && (
-        <p className={style.same}>
-          They ran on different engines: {engineWords(found.a)} and {engineWords(found.b)}.
-        </p>
+      {engines !== null && (
+        <p className={style.same}>{`${engines.charAt(0).toUpperCase()}${engines.slice(1)}.`}</p>
       )}
       <GraphChanges found={found} />
       <ValueChanges found={found} />
@@ -188,7 +188,7 @@ function Found({ runner, found }: { runner: string | undefined; found: Compariso
   return (
     <div className={style.layout}>
       <Verdict found={found} />
-      <section className={style.canvas} aria-label="Both runs on the graph">
+      <section className={style.canvas} aria-label="Both runs on the graph" data-under-stop-notice>
         {b === undefined ? (
           <Skeleton height="100%" radius={0} />
         ) : (

@@ -99,7 +99,6 @@ test("what is not known to differ is no difference: an end that one run did not 
 
 test("the likely cause is the nearest thing that differed, and none where nothing did", () => {
   expect(likelyCause(comparison([closes]))).toBeNull();
-  expect(likelyCause(comparison([closes], { same_engine: false }))).toContain("atlas");
   const changed = {
     before: 0,
     after: 0,
@@ -127,6 +126,21 @@ test("the likely cause is the nearest thing that differed, and none where nothin
   const relations = [{ ...led, fields: [{ field: "on_true", before: "run", after: null }] }];
   const rerouted = { ...changed, relations } as unknown as Comparison["graph"];
   expect(likelyCause(comparison([missing], { graph: rerouted }))).toMatch(/^the arrow .*changed$/);
+});
+
+test("what carried two runs out is told apart: by robot, else by whether it was led", () => {
+  const ran = (number: number, engine: string, robots?: Record<string, string>) =>
+    ({ number, engine, robots }) as unknown as Comparison["a"];
+  const apart = (a: Comparison["a"], b: Comparison["b"]) =>
+    likelyCause(comparison([closes], { a, b, same_engine: a.engine === b.engine }));
+  const led = ran(41, "conducted", { "": "simulator" });
+  expect(apart(ran(40, "atlas"), ran(43, "birch"))).toBe("they ran on atlas and on birch");
+  const words = "run 41 was led action by action, and run 43 was not";
+  expect(apart(led, ran(43, "simulator"))).toBe(words);
+  expect(apart(ran(43, "simulator"), led)).toBe(words);
+  const other = ran(43, "conducted", { "": "atlas" });
+  expect(apart(led, other)).toBe("they ran on simulator and on atlas");
+  expect(apart(led, { ...led, number: 43 })).toBeNull();
 });
 
 test("what happened on the way comes before any difference of the graphs, and no false cause is named", () => {

@@ -3,7 +3,7 @@
  * ranges do not overlap. Pure.
  */
 
-import { engineWords } from "../api/led-runs";
+import { CONDUCTED, engineWords } from "../api/led-runs";
 import type { ComparedField, ComparedStep, Comparison } from "../api/review";
 import type { Visit } from "../api/runs";
 import { plainValue } from "../differences/difference-words";
@@ -236,9 +236,16 @@ export function likelyCause(found: Comparison): string | null {
   );
   if (led !== undefined)
     return `the arrow ${isolated(led.parent)} → ${isolated(led.child)} was ${led.change}`;
-  if (!found.same_engine)
-    return `they ran on ${engineWords(found.a)} and on ${engineWords(found.b)}`;
-  return null;
+  return engineDifference(found);
+}
+
+/** Return how two runs differ in what carried them out, as a clause; null if they do not. */
+export function engineDifference({ a, b }: Pick<Comparison, "a" | "b">): string | null {
+  const [one, other] = [engineWords(a), engineWords(b)];
+  if (one !== other) return `they ran on ${one} and on ${other}`;
+  if (a.engine === b.engine) return null;
+  const [led, not] = a.engine === CONDUCTED ? [a, b] : [b, a];
+  return `run ${led.number} was led action by action, and run ${not.number} was not`;
 }
 
 /** Return a sentence about two runs with the names of actions as people say them. */
@@ -253,7 +260,8 @@ export function causeSentence(found: Comparison): string | null {
   if (found.parting === null)
     return cause === null ? null : `${cause.charAt(0).toUpperCase()}${cause.slice(1)}.`;
   if (cause !== null) return `Likely because ${cause}.`;
-  const same = found.same_graph && found.same_engine && found.subgraphs.length === 0;
+  const sameEngine = engineDifference(found) === null;
+  const same = found.same_graph && sameEngine && found.subgraphs.length === 0;
   return same && valueDifferences(found).length === 0
     ? "Nothing that is known differed before."
     : "Nothing that differed before is known to explain it.";

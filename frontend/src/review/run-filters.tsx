@@ -143,7 +143,8 @@ export function RunFilters({ runner, filter, onChange, engines }: Props) {
     <div className={style.filters}>
       <TextInput
         aria-label="Search runs"
-        placeholder="Graph, person, number or message"
+        placeholder="Search runs"
+        title="Graph, person, number or message"
         leftSection={<IconSearch size={15} aria-hidden />}
         value={text}
         onChange={(event) => {

@@ -413,7 +413,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           <RestList run={newest} />
           <FailureCauses runner={runner} run={newest} onShow={show} />
         </div>
-        <section className={style.canvas} aria-label="Graph of the run">
+        <section className={style.canvas} aria-label="Graph of the run" data-under-stop-notice>
           <EditorStoreProvider store={store}>
             <RunCanvas
               key={level.levels.join("\n")}

@@ -246,7 +246,7 @@ export function DesktopLayout(props: DesktopParts) {
       data-details={open ? "open" : "closed"}
     >
       <ListSide {...props} />
-      <section className={style.canvas} aria-label="Graph">
+      <section className={style.canvas} aria-label="Graph" data-under-stop-notice>
         {stage}
         {find}
         {!wide && <ListButton panels={panels} />}
