@@ -3,6 +3,7 @@
 import { expect, type Locator, type Page, test } from "@playwright/test";
 import { boxOf, card, hold, saved, umrfOf } from "./canvas";
 import { LONG, Product } from "./product";
+import { post, VALVES } from "./valves";
 
 const product = new Product();
 
@@ -158,6 +159,38 @@ test("a phone draws a graph without places top-down, and alters it for nobody un
       async () => (await boxOf(card(page, "Wait", 1))).y - (await boxOf(card(page, "Wait", 0))).y,
     )
     .toBeLessThan(first.height);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a phone shows a placed graph top-down at one tap, to look at, on its screen alone", async ({
+  browser,
+}) => {
+  const { id } = await post<{ id: string }>(product, "/api/graphs", VALVES);
+  const stored = async () => (await umrfOf(product, id)).actions;
+  const before = await stored();
+  const { page, context, failures } = await product.person(browser, "Ada", PHONE);
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  const [first, last] = [card(page, "Drive"), card(page, "Report")];
+  const isDown = async () => {
+    const [from, to] = [await boxOf(first), await boxOf(last)];
+    return to.y > from.y + from.height && Math.abs(to.x - from.x) < from.width;
+  };
+  await expect.poll(isDown).toBe(false);
+  await page.getByRole("button", { name: "Top-down" }).tap();
+  await expect(page.getByText("View only")).toBeVisible();
+  await expect.poll(isDown).toBe(true);
+  await expect(page.getByRole("button", { name: "Add an action" })).toBeDisabled();
+  await pane(page, "Outline");
+  await expect(page.getByRole("button", { name: "Add an action" })).toBeEnabled();
+  await page.reload();
+  await pane(page, "Canvas");
+  await expect.poll(isDown).toBe(true);
+  await page.getByRole("button", { name: "As placed" }).tap();
+  await expect.poll(isDown).toBe(false);
+  await expect(page.getByText("Saved", { exact: true })).toBeVisible();
+  expect(await stored()).toEqual(before);
   expect(failures).toEqual([]);
   await context.close();
 });

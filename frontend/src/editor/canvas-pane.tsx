@@ -6,8 +6,10 @@ import { IconFocus2 } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import { useSearch } from "wouter";
+import { isUnplaced } from "../canvas/geometry/arrange";
 import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
+import { TopDownButton } from "../canvas/top-down";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import {
   asksForHistory,
@@ -120,6 +122,7 @@ function PaneInFlow(props: Props) {
   const seen = useWatched(past.drawn);
   const context = useDrawnContext(seen);
   const { graph } = context;
+  const isTurnable = !isUnplaced(useGraph());
   const isDryRun = context.dryRun !== null || undefined;
   const isPast = context.past !== null || undefined;
   const { progress, marks, run } = isPast ? NOTHING_RUNS : props;
@@ -194,6 +197,7 @@ function PaneInFlow(props: Props) {
           <FollowFrame />
           <PaneFoot phone={phone || side !== null} hidden={phone && (isDryRun ?? isPast) === true}>
             {lost && <FollowRun onFollow={onFollow} />}
+            {phone && isTurnable && !isDryRun && !isPast && <TopDownButton />}
             {!context.dryRun && corner}
           </PaneFoot>
         </div>
@@ -213,7 +217,7 @@ const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
  */
 function useDrawnContext(seen: SeenPast | null): EditorContext {
   const context = useEditorContext();
-  const now = usePortrait(useGraph());
+  const now = usePortrait(useGraph(), true);
   const graph = context.past === null ? now : (seen?.drawn ?? context.graph);
   return useMemo<EditorContext>(() => ({ ...context, graph }), [context, graph]);
 }

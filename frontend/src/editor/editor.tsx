@@ -15,6 +15,7 @@ import { useListedName } from "../api/graph-list";
 import { NameOfGraph } from "../canvas/editor-store";
 import { addressAround, levelsOf } from "../canvas/level-path";
 import { FoldFrameContext, type NoteLinks, NoteLinksContext } from "../canvas/notes/note-buttons";
+import { useTopDown } from "../canvas/top-down";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import type { DryRunSeed } from "../dry-run/seed";
 import type { DryRun } from "../dry-run/use-dry-run";
@@ -404,7 +405,12 @@ export function Editor(props: Props) {
   const search = useSearch();
   const panels = usePanels(pointsInside(search));
   const past = usePast();
-  const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel, past);
+  const { context, adding, overlay, ...editor } = useEditor(
+    id,
+    panels.onPanel,
+    past,
+    panels.pane === "canvas",
+  );
   const link = useThrottledLink();
   const drawn = link.seq > 0;
   const rename = useRenameGraph(context);
@@ -425,11 +431,13 @@ export function Editor(props: Props) {
   const begins = { beginning, endBeginning: editor.closeOverlay };
   const summary = useSummary(context, link, { seq: problems?.seq, told }, place, begins);
   const { compact, phone } = summary;
+  const { isTurned } = useTopDown();
   useEffect(() => {
     if (phone) void Outline.preload(); // beside the layout, which shows it first
   }, [phone]);
   const stage = (
     <CanvasPane
+      key={String(phone && isTurned)}
       me={props.me}
       canvasHandle={editor.canvasHandle}
       progress={progress}

@@ -3,8 +3,10 @@
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/people";
 import { useEditorStore } from "../canvas/editor-store";
-import { inPortrait } from "../canvas/geometry/portrait";
+import { isUnplaced } from "../canvas/geometry/arrange";
+import { inPortrait, topDown } from "../canvas/geometry/portrait";
 import { CARD } from "../canvas/geometry/ranks";
+import { useTopDown } from "../canvas/top-down";
 import { useDryRun } from "../dry-run/use-dry-run";
 import {
   type AddRequest,
@@ -64,30 +66,38 @@ export interface EditorState {
   closeFind(): void;
 }
 
-/** Return the graph as this screen draws it: on a phone one without places may be drawn top-down. */
-export function usePortrait(graph: Graph): Graph {
+/**
+ * Return the graph as this screen draws it. On a phone one without places may be drawn top-down; so is one with
+ * places on the canvas, as long as this device asks for it.
+ */
+export function usePortrait(graph: Graph, isOnCanvas: boolean): Graph {
   const phone = useIsPhone();
+  const { isTurned } = useTopDown();
   return useMemo(() => {
+    if (!phone) return graph;
+    if (isTurned && isOnCanvas && !isUnplaced(graph)) return topDown(graph);
     const { innerWidth, innerHeight } = window;
-    return phone ? inPortrait(graph, { width: innerWidth, height: innerHeight }) : graph;
-  }, [graph, phone]);
+    return inPortrait(graph, { width: innerWidth, height: innerHeight });
+  }, [graph, phone, isTurned, isOnCanvas]);
 }
 
 /** Return the graph and its document, and what this person may do with it. */
-function useEdited(id: string, { place: past, seen, lookAt }: Past) {
+function useEdited(id: string, { place: past, seen, lookAt }: Past, isOnCanvas: boolean) {
   const { doc, undo } = useRoom();
-  const now = usePortrait(useThrottledGraph());
+  const stored = useThrottledGraph();
+  const now = usePortrait(stored, isOnCanvas);
   const undoable = useUndo();
   const role = useMay("edit");
   const mayRun = useMay("simulate");
   const { readOnly, seq } = useThrottledLink();
-  const { dryRun, begin: beginDryRun } = useDryRun(id, now, seq);
+  const { dryRun, begin: beginDryRun } = useDryRun(id, stored, seq);
   // Nobody may edit before the graph has arrived: an edit would not know what it replaces.
   const arrived = useLinkPart((link) => link.seq > 0);
   const mayGoBack = role && readOnly === undefined && arrived;
   const graph = past === null ? now : (seen?.graph ?? now);
-  // While the past is shown the graph is read-only.
-  const mayEdit = mayGoBack && past === null;
+  // While the past is shown, or a placed graph stands top-down, it is read-only.
+  const isTurned = isUnplaced(now) && !isUnplaced(stored);
+  const mayEdit = mayGoBack && past === null && !isTurned;
   const canUndo = undoable.canUndo && past === null;
   const canRedo = undoable.canRedo && past === null;
   return useMemo(
@@ -200,16 +210,17 @@ function canvasOf(handle: RefObject<CanvasHandle>) {
 
 /**
  * Return the state of an editor. `onPanel`: called when an edit action opens a panel; `past`: the
- * moment shown.
+ * moment shown; `isOnCanvas`: a phone shows the canvas.
  */
 export function useEditor(
   id: string,
   onPanel: (panel: Panel) => void,
   past: Past = NO_PAST,
+  isOnCanvas = false,
 ): EditorState {
   const latest = useRef<EditorContext | null>(null);
   const store = useEditorStore();
-  const edited = useEdited(id, past);
+  const edited = useEdited(id, past, isOnCanvas);
   const tools = useTools();
   const { keys: folded, put: fold } = useKeptKeys("aa.folded", id);
   const { openers, opened } = useDialogs(latest, onPanel);

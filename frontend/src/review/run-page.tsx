@@ -15,7 +15,10 @@ import { type RunNote, useRunNotes } from "../api/run-notes";
 import { type Run, useRun } from "../api/runs";
 import { EditorStore, EditorStoreProvider } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
+import { isUnplaced } from "../canvas/geometry/arrange";
+import { topDown } from "../canvas/geometry/portrait";
 import { GraphView } from "../canvas/graph-view";
+import { TopDownButton, useTopDown } from "../canvas/top-down";
 import { serverTimeOf } from "../clock/server-clock";
 import { runMarks } from "../graph/breakpoints";
 import type { Key, Position } from "../graph/model";
@@ -235,10 +238,18 @@ function enginesOf(run: Run, mates: readonly Track[]): string[] {
 }
 
 /** The page is drawn with time, the canvas only with what changes on it. */
-const RunCanvas = memo(function RunCanvas(props: Parameters<typeof GraphView>[0]) {
+const RunCanvas = memo(function RunCanvas({ graph, ...props }: Parameters<typeof GraphView>[0]) {
+  const isTurnable = useIsPhone() && !isUnplaced(graph);
+  const isTurned = useTopDown().isTurned && isTurnable;
+  const drawn = useMemo(() => (isTurned ? topDown(graph) : graph), [graph, isTurned]);
   return (
-    <ReactFlowProvider>
-      <GraphView {...props} />
+    <ReactFlowProvider key={String(isTurned)}>
+      <GraphView graph={drawn} {...props} />
+      {isTurnable && (
+        <div className={style.turn}>
+          <TopDownButton />
+        </div>
+      )}
     </ReactFlowProvider>
   );
 });

@@ -52,6 +52,11 @@ test("what runs is named by robot, and what was only concluded is marked", () =>
   ]);
 });
 
+test("a run in the simulator moves nothing, so the bar keeps its words", () => {
+  const simulated = run({ simulated: true, engine: "simulator" });
+  expect(movesNow(live([simulated, run({})])).map(({ robot }) => robot)).toEqual(["atlas"]);
+});
+
 test("what runs inside of an action is named by the way to it, as people call it", () => {
   const inner = { ...action("RUNNING"), aid: null as unknown as string };
   const round = run({

@@ -120,7 +120,7 @@ function ofRobot(run: Run, robot: string, silent = false): Moving {
 
 /** Return what moves on each robot of a run; actions of a led run without a robot are simulated. */
 function ofRun(run: Run, silent: ReadonlySet<string>): Moving[] {
-  if (!run.robots) return [ofRobot(run, run.simulated ? SIMULATOR : run.engine)];
+  if (!run.robots) return [ofRobot(run, run.engine)];
   const all = Object.entries(run.actions ?? {});
   return enginesOf(run).map((robot) => {
     const own = all.filter(([, action]) => (action.robot || SIMULATOR) === robot);
@@ -130,10 +130,15 @@ function ofRun(run: Run, silent: ReadonlySet<string>): Moving[] {
   });
 }
 
+/** In the simulator nothing moves; a led run there says for what it waits. */
+const isToTell = (run: Run) => !run.simulated || Boolean(run.robots);
+
 /** Return what moves now, sorted by robot. While the runner is not heard, that is unknown for each of them. */
 export function movesNow(now: LiveState): Moving[] {
   const silent = silentRobots(now);
-  const runs = openRuns(now).flatMap((run) => ofRun(run, silent));
+  const runs = openRuns(now)
+    .filter(isToTell)
+    .flatMap((run) => ofRun(run, silent));
   const foreign = foreignGraphs(now).map(({ robot, held }): Moving => {
     const base = { robot: robot.name, run: null };
     if (silent.has(robot.name))

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { EMPTY_GRAPH, ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
 import { anyAction, anyRelation } from "../../testing/graphs";
-import { inPortrait } from "./portrait";
+import { inPortrait, topDown } from "./portrait";
 
 const PHONE = { width: 390, height: 844 };
 
@@ -34,4 +34,18 @@ test("a graph in which somebody has placed a card is drawn as it stands", () => 
   if (first === undefined) throw new Error("no action");
   const placed = { ...chain, actions: [{ ...first, position: [0, 0] as const }, ...others] };
   expect(inPortrait(placed, PHONE)).toBe(placed);
+});
+
+test("a placed graph is turned without its places, each action the same object as long as it is unchanged", () => {
+  const placed: Graph = {
+    ...chain,
+    actions: chain.actions.map((action, i) => ({ ...action, position: [i * 300, 0] as const })),
+    entryPosition: [-200, 0],
+  };
+  const turned = topDown(placed);
+  expect(turned.direction).toBe("down");
+  expect(turned.entryPosition).toBeNull();
+  expect(turned.actions.map(({ position }) => position)).toEqual([null, null, null, null]);
+  expect(topDown({ ...placed, name: "other" }).actions[0]).toBe(turned.actions[0]);
+  expect(placed.actions[1]?.position).toEqual([300, 0]);
 });

@@ -8,6 +8,7 @@ import { addActionAt, type EditorContext, freePosition } from "../../edit-action
 import { relationId } from "../../graph/document-keys";
 import { asOneEdit, connect, type NewAction } from "../../graph/edit";
 import {
+  type Action,
   ENTRY,
   EXIT,
   type Key,
@@ -37,18 +38,21 @@ function ends(context: EditorContext, end: typeof ENTRY | typeof EXIT, near: Key
     return Math.hypot(x - x0, y - y0);
   };
   const actions = [...context.graph.actions].sort((a, b) => far(a.key) - far(b.key));
+  const optionOf = ({ key, actor }: Action): Option => ({
+    id: key,
+    label: endName(context.graph, key),
+    ...(actor === "" ? {} : { sub: actor }),
+    icon: <IconSquareRounded size={16} aria-hidden style={{ color: colorOfName(actor) }} />,
+  });
+  // An arrow from an action to itself is rare: it comes last.
+  const itself = actions.filter(({ key }) => key === near).map(optionOf);
+  const others = actions.filter(({ key }) => key !== near).map(optionOf);
   return [
-    ...actions.map(
-      ({ key, name, instanceId, actor }): Option => ({
-        id: key,
-        label: `${name} ${instanceId}`,
-        ...(actor === "" ? {} : { sub: actor }),
-        icon: <IconSquareRounded size={16} aria-hidden style={{ color: colorOfName(actor) }} />,
-      }),
-    ),
+    ...others,
     end === ENTRY
       ? { id: ENTRY, label: "Entry", icon: <IconPlayerPlay size={16} aria-hidden /> }
       : { id: EXIT, label: "Exit", icon: <IconFlag size={16} aria-hidden /> },
+    ...itself,
   ];
 }
 
