@@ -67,6 +67,7 @@ EXCEPT: Final = {
     "editor post /api/passkeys/confirm": "confirmed, in tests/web/auth/test_passkeys.py",
     "editor put /api/passkeys/ask-again": "passkey_changed, in tests/web/auth/test_passkeys.py",
     "runner post /api/sessions/ended": "in tests/web/auth/test_changed_rights.py",
+    "runner post /api/practice": "the row is that of the registered robot, in tests/ros/test_practice_robot.py",
     "runner post /api/robots/{name}/index": "index_write_asked, in tests/runner/api/test_index.py",
     "runner post /api/robots/{name}/baton/hand": "in tests/runner/start/test_rights_registry.py",
     "runner post /api/robots/{name}/drills": "robot.drilled, in tests/runner/robots/test_drills.py",

@@ -19,6 +19,7 @@ WITHOUT_BODY = frozenset(
         "/api/people/{person}/sessions/end",
         "/api/members/{person}/end",
         "/api/devices/end",
+        "/api/practice",
         "/api/devices/codes",
         "/api/passkeys/challenge",
         "/api/passkeys/confirm/challenge",

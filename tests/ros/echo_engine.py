@@ -13,6 +13,7 @@ from typing import Any
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import LoggingSeverity
 from rclpy.qos import QoSProfile
 from temoto_msgs.msg import (
     UmrfGraphFeedback,
@@ -98,6 +99,18 @@ class EchoEngine:
     def log(self, text: str) -> None:
         """A line on /rosout."""
         self._node.get_logger().info(text)
+
+    def log_on_every_level(self, text: str) -> None:
+        """A line on /rosout for each level, which begins with the level."""
+        logger = self._node.get_logger()
+        logger.set_level(LoggingSeverity.DEBUG)
+        levels = ("debug", "info", "warn", "error", "fatal")
+        debug, info, warn, error, fatal = (f"{each} {text}" for each in levels)
+        logger.debug(debug)
+        logger.info(info)
+        logger.warning(warn)
+        logger.error(error)
+        logger.fatal(fatal)
 
     def speak(self) -> None:
         """Get ready to publish commands, as somebody else's terminal would."""

@@ -111,6 +111,11 @@ export async function registerRobot(runner: string, robot: Registration): Promis
   return runnerOnlyAt(runner).post("/api/robots", { body: robot });
 }
 
+/** Starts an emulated robot on the computer of the runner, and registers it. */
+export function startPracticeRobot(runner: string): Promise<Robot> {
+  return runnerOnlyAt(runner).post("/api/practice", {});
+}
+
 export function changeRobot(runner: string, robot: Registration): Promise<Robot> {
   const { name, ...body } = robot;
   return runnerAt(runner).patch("/api/robots/{name}", { path: { name }, body });

@@ -1,13 +1,21 @@
 /** Robots: how their engines are, what runs there, who else is at it, and how to add one. */
 import { Button, Code, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import { IconPlus, IconRadar2, IconRobot } from "@tabler/icons-react";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { Fragment, useState } from "react";
 import { Link } from "wouter";
-import { runnerWords } from "../api/http";
+import { errorText, runnerWords } from "../api/http";
 import type { SiteState } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
-import { type FoundEngine, type Registration, useFoundEngines, useRosReach } from "../api/robots";
+import {
+  type FoundEngine,
+  type Registration,
+  startPracticeRobot,
+  useFoundEngines,
+  useRosReach,
+} from "../api/robots";
 import { Empty } from "../ui/empty";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { counted } from "../words/counted";
@@ -31,14 +39,26 @@ interface Props {
   onImport: (text: string, name: string) => void;
 }
 
-function Practise() {
+/** The name of the robot that the runner starts for practice. */
+const PRACTICE = "Practice";
+
+function PracticeButton({ runner }: { runner: string }) {
+  const client = useQueryClient();
+  const start = useMutation({
+    mutationFn: () => startPracticeRobot(runner),
+    onError: (error) => notifications.show({ color: "red", message: errorText(error) }),
+    onSettled: () => client.invalidateQueries({ queryKey: ["robots", "reach"] }),
+  });
   return (
-    <p>
-      Without a robot, practise with an emulated one: it behaves like a real engine.
-      <Code block className={style.code ?? ""}>
-        action-assistant simulate-robot David
-      </Code>
-    </p>
+    <Button
+      variant="default"
+      leftSection={<IconRobot size={16} aria-hidden />}
+      loading={start.isPending}
+      title="Starts an emulated robot on the server’s computer; it moves nothing"
+      onClick={() => start.mutate()}
+    >
+      Practice robot
+    </Button>
   );
 }
 
@@ -83,6 +103,8 @@ export function RobotsPage({ onImport }: Props) {
       domain: candidate.domain,
       get_service: candidate.get_service,
     });
+  const isPractising = robots.some(({ name }) => name === PRACTICE);
+  const canPractise = may && reach?.no_reach === "" && !isPractising;
   const button = (
     <Button
       variant="filled"
@@ -94,12 +116,18 @@ export function RobotsPage({ onImport }: Props) {
       Register a robot
     </Button>
   );
+  const buttons = (
+    <div className="row-wrap gap-50">
+      {button}
+      {canPractise && runner !== undefined && <PracticeButton runner={runner} />}
+    </div>
+  );
   return (
     <main className="page">
       <div className={style.inner}>
         <div className={style.head}>
           <h2 className="page-title">Robots</h2>
-          {robots.length > 0 && button}
+          {robots.length > 0 && buttons}
         </div>
         {queued > 0 && (
           <p>
@@ -115,10 +143,10 @@ export function RobotsPage({ onImport }: Props) {
           </div>
         )}
         {known && robots.length === 0 && (
-          <Empty icon={<IconRobot size={22} />} title="No robot yet" action={button}>
+          <Empty icon={<IconRobot size={22} />} title="No robot yet" action={buttons}>
             Register the name of its TeMoto engine. Then everybody here sees its state and what runs
             on it, and can stop it.
-            <Practise />
+            <p>A practice robot behaves like a real engine, and moves nothing.</p>
           </Empty>
         )}
         {(now.sites ?? [null]).map((at) => (

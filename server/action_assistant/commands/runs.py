@@ -1,4 +1,4 @@
-"""The command `runs` with its own commands: at-rest, wait, step, go-on, since, examples, verify, archive and copy."""
+"""The command `runs` with its own commands: at-rest, wait, step, go-on, log, since, examples, verify, archive and copy."""
 
 import argparse
 import asyncio
@@ -26,6 +26,7 @@ from action_assistant.commands.place import add_data
 from action_assistant.commands.presses import press
 from action_assistant.commands.questions import add_questions
 from action_assistant.commands.repeats import add_repeats
+from action_assistant.commands.run_log import add_log
 from action_assistant.commands.second_person import add_second_person
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line, told
@@ -47,7 +48,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
     more = runs.add_subparsers(
-        metavar="at-rest | wait | step | go-on | questions | answer | repeats | next | stop-repeating | look-again | since | verify | archive | restore | copy | examples"
+        metavar="at-rest | wait | step | go-on | log | questions | answer | repeats | next | stop-repeating | look-again | since | verify | archive | restore | copy | examples"
     )
     rests = command(
         more,
@@ -92,6 +93,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     )
     _add_watching(steps)
     steps.set_defaults(handler=_step)
+    add_log(more)
     add_questions(more)
     add_repeats(more)
     add_second_person(more)

@@ -3796,6 +3796,9 @@ export interface RunnerPaths {
     "/api/candidates/now": {
         get: RunnerOperations["getFoundEngines"];
     };
+    "/api/practice": {
+        post: RunnerOperations["startPracticeRobot"];
+    };
     "/api/robots/{name}": {
         get: RunnerOperations["getRobot"];
         delete: RunnerOperations["forgetRobot"];
@@ -4758,6 +4761,15 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["Sighting"];
+                };
+            };
+        };
+    };
+    startPracticeRobot: {
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
                 };
             };
         };

@@ -13,6 +13,8 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
+from action_assistant.runner.api.practice import NAME as PRACTICE
+from action_assistant.runner.api.practice import PracticeRobot, practice_route
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.run_guard import require_all_on_robot, shown, unseen_by
 from action_assistant.runner.api.services import RunnerServices
@@ -172,6 +174,8 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
+    practice = PracticeRobot()
+
     @get(
         "/api/robots",
         summary="Engines that runs can go to",
@@ -249,8 +253,11 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def remove(name: str, request: _Asking) -> None:
         _require_owner_to_loosen(services, name, None, request)
         await services.control.remove(name, author_of(request))
+        if name == PRACTICE:
+            practice.end()
 
-    return [robots, reach, candidates, sighting, register, change, remove]
+    started = practice_route(services, practice)
+    return [robots, reach, candidates, sighting, register, started, change, remove]
 
 
 def _require_owner_to_loosen(

@@ -51,6 +51,7 @@ FILTERED: Final = frozenset(
         *("/api/comparison", "/api/statistics", "/api/approvals", "/api/approvals/asked"),
         *("/api/expectations", "/api/expectations/{name:str}", "/api/expectations/check"),
         *("/api/robots", "/api/reach", "/api/robots/{name:str}", "/api/robots/{name:str}/known"),
+        "/api/practice",
         *("/api/robots/{name:str}/events", "/api/robots/{name:str}/events/{seq:int}/umrf"),
         *("/api/robots/{name:str}/umrf", "/api/robots/{name:str}/recordings/{file:str}"),
         *("/api/robots/{name:str}/rights", "/api/robots/{name:str}/lock"),
