@@ -53,6 +53,20 @@ test("values, names and places", () => {
   ]);
 });
 
+test("breakpoints are said in words, not by what the document keeps of them", () => {
+  const set = changed("d", "DriveTo_0", ["breakpoint", null, "{}"]);
+  const other = changed("w", "Wait_1", ["breakpoint", "{}", '{"visit":2}']);
+  const between = {
+    ...arrow("changed", "Dock", "Charge"),
+    fields: [{ field: "breakpoint", before: "{}", after: null }],
+  };
+  expect(words({ actions: [set, other], relations: [between] })).toEqual([
+    "set a breakpoint at DriveTo",
+    "removed the breakpoint at Dock → Charge",
+    "changed the breakpoint at Wait 1",
+  ]);
+});
+
 test("what an arrow says of an outcome", () => {
   const fields = [
     { field: "on_true", before: "ignore", after: "run" },

@@ -57,17 +57,23 @@ function actionLines(action: ChangedAction, arrows: number): EntryLine[] {
     return [{ sign: "removed", of, parts: [text("removed "), spoken, ...its] }];
   }
   const renamed = action.fields.find(({ field }) => field === "name");
-  const others = action.fields.filter(({ field }) => field !== "name" && field !== "position");
-  const lines: EntryLine[] = linesOf(others).map((line) => ({
-    sign: "changed",
-    of,
-    parts: [
-      text("set "),
-      spoken,
-      text(` ${line.name.replace(/^input /, "")}`),
-      ...fromTo(line.before, line.after),
-    ],
-  }));
+  const waits = action.fields.filter(isBreakpoint);
+  const others = action.fields.filter(
+    (field) => !["name", "position"].includes(field.field) && !isBreakpoint(field),
+  );
+  const set = linesOf(others).map(
+    (line): EntryLine => ({
+      sign: "changed",
+      of,
+      parts: [
+        text("set "),
+        spoken,
+        text(` ${line.name.replace(/^input /, "")}`),
+        ...fromTo(line.before, line.after),
+      ],
+    }),
+  );
+  const lines = [...waits.map((field) => breakpointLine(field, of, [spoken])), ...set];
   if (renamed === undefined) return lines;
   const was = { kind: "old", text: spokenName(String(renamed.before)) } as const;
   return [{ sign: "changed", of, parts: [text("renamed "), was, text(" to "), spoken] }, ...lines];
@@ -101,6 +107,16 @@ function outcomeLine(field: FieldChange, of: string, ends: readonly LinePart[]):
   return { sign: "changed", of, parts: [text("set "), ...ends, when, ...fromTo(was, is)] };
 }
 
+const isBreakpoint = ({ field }: FieldChange): boolean => field === "breakpoint";
+
+/** A breakpoint is said as such: its value is JSON, which says nothing to people. */
+function breakpointLine(field: FieldChange, of: string, where: readonly LinePart[]): EntryLine {
+  const [was, is] = [field.before ?? null, field.after ?? null];
+  const sign = was === null ? "added" : is === null ? "removed" : "changed";
+  const did = { added: "set a", removed: "removed the", changed: "changed the" }[sign];
+  return { sign, of, parts: [text(`${did} breakpoint at `), ...where] };
+}
+
 function arrowLines(arrow: ChangedArrow): EntryLine[] {
   const of = arrow.ends.join(">");
   const ends = [name(spokenName(arrow.parent)), text(" → "), name(spokenName(arrow.child))];
@@ -109,8 +125,11 @@ function arrowLines(arrow: ChangedArrow): EntryLine[] {
     const did = text(arrow.change === "added" ? "connected " : "removed the arrow ");
     return [{ sign: arrow.change, of, parts: [did, ...ends, ...words] }];
   }
-  const others = arrow.fields.filter((field) => !isOutcome(field) && !isBend(field));
+  const others = arrow.fields.filter(
+    (field) => !isOutcome(field) && !isBend(field) && !isBreakpoint(field),
+  );
   return [
+    ...arrow.fields.filter(isBreakpoint).map((field) => breakpointLine(field, of, ends)),
     ...arrow.fields.filter(isOutcome).map((field) => outcomeLine(field, of, ends)),
     ...linesOf(others).map((line): EntryLine => {
       const set = [text("set "), ...ends, text(` ${line.name}`)];

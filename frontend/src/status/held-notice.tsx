@@ -137,6 +137,7 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
   const disabled = obstacle !== null || now.link !== "live";
   const robots = enginesOf(run).filter((engine) => engine !== SIMULATOR);
   const players = robots.map(isolated).join(", ");
+  const isPress = robots.length === 0;
   const moves =
     players === "" ? "Only the simulator plays: nothing moves." : `${players} may begin to move.`;
   return (
@@ -153,6 +154,7 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
             name={`Let only ${place} begin, then wait again`}
             question={`Let only ${place} begin? ${robot === SIMULATOR ? "Nothing moves." : "A robot may begin to move at once."}`}
             disabled={disabled}
+            isPress={isPress}
             onHeld={() => press.mutate({ action })}
           />
         );
@@ -168,6 +170,7 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
             name={`Let all inside of ${level} begin, then wait again`}
             question={`Let all inside of ${level} begin? ${moves}`}
             disabled={disabled}
+            isPress={isPress}
             onHeld={() => press.mutate({ over })}
           />
         );
@@ -175,10 +178,11 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
       <HoldButton
         size="compact-sm"
         icon={<IconPlayerPlayFilled size={13} aria-hidden />}
-        label={obstacle ?? "Hold to go on"}
+        label={obstacle ?? (isPress ? "Go on" : "Hold to go on")}
         name={`Let run ${run.number} go on${end}`}
         question={`Let run ${run.number} go on${end}? ${moves}`}
         disabled={disabled}
+        isPress={isPress}
         onHeld={() => press.mutate(until === "" ? null : { until })}
       />
       {later.length > 0 && (

@@ -70,6 +70,7 @@ function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string;
   const obstacle = busy ? "Asking …" : watch.obstacle;
   const disabled = obstacle !== null || away;
   const moves = movesWords(run);
+  const isPress = robotsOf(run).length === 0;
   return (
     <section className={style.point} aria-label={`${where} in run ${run.number}`}>
       <b>
@@ -94,7 +95,8 @@ function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string;
           <HoldButton
             size="compact-sm"
             icon={<IconHandOff size={13} aria-hidden />}
-            label={obstacle ?? "Hold: do not wait here"}
+            label={obstacle ?? (isPress ? "Do not wait here" : "Hold: do not wait here")}
+            isPress={isPress}
             name={`Let run ${run.number} no longer wait at ${where}`}
             question={`Let run ${run.number} no longer wait at ${where}? ${moves}`}
             disabled={disabled}
@@ -108,7 +110,8 @@ function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string;
           <HoldButton
             size="compact-sm"
             icon={<IconPlayerTrackNext size={13} aria-hidden />}
-            label={obstacle ?? "Hold to go on until here"}
+            label={obstacle ?? (isPress ? "Go on until here" : "Hold to go on until here")}
+            isPress={isPress}
             name={`Let run ${run.number} go on until ${where} is about to begin`}
             question={`Let run ${run.number} go on until ${where} is about to begin? ${moves}`}
             disabled={disabled}
@@ -120,8 +123,10 @@ function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string;
   );
 }
 
+const robotsOf = (run: Run) => enginesOf(run).filter((engine) => engine !== SIMULATOR);
+
 function movesWords(run: Run): string {
-  const robots = enginesOf(run).filter((engine) => engine !== SIMULATOR);
+  const robots = robotsOf(run);
   return robots.length === 0
     ? "Only the simulator plays: nothing moves."
     : `${robots.map(isolated).join(", ")} may begin to move.`;

@@ -19,14 +19,34 @@ interface Props {
   disabled?: boolean;
   size?: ButtonProps["size"];
   icon?: ReactNode;
+  /** Nothing moves: a press is enough. */
+  isPress?: boolean;
   onHeld: () => void;
+}
+
+/** A button that acts when it is held, or, where nothing moves, when it is pressed. */
+export function HoldButton({ isPress = false, ...props }: Props) {
+  const { label, name, disabled = false, size, icon, onHeld } = props;
+  if (!isPress) return <HeldButton {...props} />;
+  return (
+    <Button
+      size={size ?? "sm"}
+      disabled={disabled}
+      title={name}
+      leftSection={icon}
+      onClick={onHeld}
+    >
+      <span aria-hidden>{label}</span>
+      <span className="visually-hidden">{name}</span>
+    </Button>
+  );
 }
 
 /**
  * A button that acts when it was held for `HOLD` ms by pointer, Enter or space. A shorter press, as that of a screen
  * reader, asks `question` first.
  */
-export function HoldButton({ label, name, question, disabled = false, size, icon, onHeld }: Props) {
+function HeldButton({ label, name, question, disabled = false, size, icon, onHeld }: Props) {
   const [holding, setHolding] = useState(false);
   // Null until it was asked for the first time.
   const [asking, setAsking] = useState<boolean | null>(null);

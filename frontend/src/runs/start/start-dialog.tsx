@@ -252,12 +252,10 @@ function Exactly({
       <dt className="ink2">Graph</dt>
       <dd>{name}</dd>
       <dt className="ink2">Version</dt>
-      <dd>
+      <dd title={digest}>
         {label}
         {same !== "" && <span className="quiet-xs">, the same graph as {same}</span>}
       </dd>
-      <dt className="ink2">Digest</dt>
-      <dd className="weight-400 mono">{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
       <dt className="ink2">{engines.length > 1 ? "Robots" : "On"}</dt>
       <dd>{engines.map(isolated).join(", ") || "nowhere yet"}</dd>
       {moves !== "" && (

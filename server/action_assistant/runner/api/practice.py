@@ -39,7 +39,7 @@ class PracticeRobot:
         self.end()
         domain = next(each for each in _DOMAINS if each not in taken)
         self._process = await to_thread.run_sync(_spawned, domain)
-        return Registration(name=NAME, domain=domain)
+        return Registration(name=NAME, domain=domain, led=True)
 
     def end(self) -> None:
         """Have the process end, if there is one."""
