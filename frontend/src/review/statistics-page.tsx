@@ -71,7 +71,7 @@ const partWords = ({ result, count, said }: ResultPart): string =>
 
 function ResultBar({ action }: { action: ActionStatistics }) {
   const parts = resultParts(action);
-  const text = parts.map(partWords).join(", ");
+  const text = parts.map(partWords).join(", ") || "never ran";
   const said = parts.filter((part) => part.said);
   return (
     <>
@@ -210,7 +210,7 @@ function Found({ found }: { found: Statistics }) {
     <div className={style.inner}>
       <div className={style.cards}>
         <section className={style.card}>
-          <h3>Success</h3>
+          <h2>Success</h2>
           <p className={style.big}>{rate === null ? "—" : `${rate} %`}</p>
           <p className="m-0 faint-12">
             {found.judged > 0 && `${found.succeeded} of ${found.judged} runs finished true. `}
@@ -220,7 +220,7 @@ function Found({ found }: { found: Statistics }) {
           </p>
         </section>
         <section className={style.card}>
-          <h3>Most failing</h3>
+          <h2>Most failing</h2>
           {failing.length === 0 ? (
             <p className="m-0 faint-12">
               {hidden > 0
@@ -241,7 +241,7 @@ function Found({ found }: { found: Statistics }) {
           )}
         </section>
         <section className={style.card}>
-          <h3>Arrows never taken</h3>
+          <h2>Arrows never taken</h2>
           {found.never_taken.length === 0 ? (
             <p className="m-0 faint-12">
               {found.untold > 0
@@ -270,11 +270,11 @@ function Found({ found }: { found: Statistics }) {
         </section>
       </div>
       <section className={style.card}>
-        <h3>The newest {found.runs.length} runs</h3>
+        <h2>The newest {found.runs.length} runs</h2>
         <RunBars runs={found.runs} />
       </section>
       <section className={style.card}>
-        <h3>Where the time goes</h3>
+        <h2>Where the time goes</h2>
         <Actions actions={found.actions} />
       </section>
     </div>
