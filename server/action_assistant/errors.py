@@ -43,8 +43,22 @@ class Refused(Exception):
     @property
     def type(self) -> str:
         """Return a stable name for programs, for example `not-found`."""
-        name = type(self).__name__
-        return "".join(f"-{c.lower()}" if c.isupper() else c for c in name).lstrip("-")
+        return _type_of(type(self))
+
+
+def _type_of(kind: type[Refused]) -> str:
+    return "".join(f"-{c.lower()}" if c.isupper() else c for c in kind.__name__).lstrip("-")
+
+
+def refused_elsewhere(type_: str, detail: str, where: dict[str, object] | None) -> Refused:
+    """Return the refusal that another process of this program has answered, by its `type`; Unavailable for a
+    type that is unknown here."""
+    kinds = [Refused]
+    for kind in kinds:  # it grows meanwhile
+        if _type_of(kind) == type_:
+            return kind(detail, where=where)
+        kinds += kind.__subclasses__()
+    return Unavailable(detail, where=where)
 
 
 class BadInput(Refused):

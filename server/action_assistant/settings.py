@@ -2,6 +2,7 @@
 
 import os
 import re
+import socket
 import sys
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
@@ -32,6 +33,9 @@ VARIABLES: Final[Mapping[str, str]] = {
     "asks, as --trusted-proxies",
     "ACTION_ASSISTANT_RUNNERS": "several runners for one page, as --runner, such as "
     "`Hall A=http://127.0.0.1:8001;Hall B=http://127.0.0.1:8011` (the one beside the editor)",
+    "ACTION_ASSISTANT_CLUSTER_LISTEN": "where an editor listens for the other editors of its database, as "
+    "--cluster-listen",
+    "ACTION_ASSISTANT_CLUSTER_URL": "where they find it, as --cluster-url",
     "ACTION_ASSISTANT_RUNNER_PYTHON": "the Python that has rclpy; `serve` runs the runner under it",
     "ACTION_ASSISTANT_KEEP_RUNS": "days after which runs go into archives (for ever)",
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
@@ -77,6 +81,10 @@ VARIABLES: Final[Mapping[str, str]] = {
 }
 INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
 RUNNERS: Final = "ACTION_ASSISTANT_RUNNERS"
+CLUSTER_LISTEN: Final = "ACTION_ASSISTANT_CLUSTER_LISTEN"
+CLUSTER_URL: Final = "ACTION_ASSISTANT_CLUSTER_URL"
+#: The URL of another editor: nothing is encrypted between editors, and no path goes before.
+_PLAIN_URL: Final = re.compile(r"http://([A-Za-z0-9._-]+|\[[0-9a-fA-F:]+\]):\d{1,5}")
 #: The variables that name a file with a secret, and the variable that the secret stands for.
 _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
@@ -157,11 +165,21 @@ class Site(msgspec.Struct, frozen=True):
     url: str
 
 
+class Cluster(msgspec.Struct, frozen=True):
+    """The place of this editor among several of one database. `host`, `port`: where it listens for the others;
+    `url`: where they find it, without a slash at its end."""
+
+    host: str
+    port: int
+    url: str
+
+
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
     `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS; `frames`: the origins of sites
     that may show links to one thing in a frame; `run_links`: as in ACTION_ASSISTANT_RUN_LINKS; `oidc`: the values of the variables
-    ACTION_ASSISTANT_OIDC_…; `sites`: the runners of the page, if there are several."""
+    ACTION_ASSISTANT_OIDC_…; `sites`: the runners of the page, if there are several; `cluster`: None for the only editor of its
+    database."""
 
     data: Path
     database: str
@@ -169,6 +187,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int = 8000
     runner_port: int = 8001
     sites: tuple[Site, ...] = ()
+    cluster: Cluster | None = None
     hosts: tuple[str, ...] = ()
     limits: bool = True
     load: LoadLimits = LoadLimits()
@@ -271,6 +290,27 @@ def port_number(text: str) -> int:
     if not 0 < number < 65536:
         raise ValueError
     return number
+
+
+def cluster(listen: str, url: str, environ: Mapping[str, str] = os.environ) -> Cluster | None:
+    """Return the place of an editor among several: `listen` (HOST:PORT) and `url` as the options give them,
+    else as the environment does; None if it is the only one. Without a URL the others find it by the host
+    that it listens at, or by this computer's name if that is every address. Raise CannotStart for another
+    form."""
+    listen = listen or environ.get(CLUSTER_LISTEN, "").strip()
+    url = url or environ.get(CLUSTER_URL, "").strip()
+    if not listen:
+        return None
+    host, sign, number = listen.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]")
+    if not sign or not host or not number.isdecimal() or not 0 < int(number) < 65536:
+        raise CannotStart(f"--cluster-listen is HOST:PORT, not {listen!r}.")
+    if not url:
+        name = socket.gethostname() if host in {"0.0.0.0", "::"} else host
+        url = f"http://{f'[{name}]' if ':' in name else name}:{number}"
+    if not _PLAIN_URL.fullmatch(url):
+        raise CannotStart(f"--cluster-url is http://HOST:PORT, not {url!r}.")
+    return Cluster(host, int(number), url)
 
 
 def share(environ: Mapping[str, str] = os.environ) -> str:

@@ -17,7 +17,7 @@ _NOBODY: Final = 65534
 _SETTINGS: Final = {
     "listen_addresses": "127.0.0.1",
     "unix_socket_directories": "",
-    "max_connections": "30",
+    "max_connections": "100",
     "shared_buffers": "8MB",
     "fsync": "on",
     "synchronous_commit": "on",

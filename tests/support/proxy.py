@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 DOCUMENTED = Path(__file__).parents[2] / "docs" / "proxy" / "nginx.conf"
+EDITORS = DOCUMENTED.with_name("nginx-editors.conf")
 NGINX = shutil.which("nginx", path="/usr/sbin:/usr/local/sbin:/usr/bin") or ""
 
 
@@ -21,13 +22,15 @@ def nginx(
     editor: int,
     mistake: tuple[str, str] = ("", ""),
     identity: tuple[Path, Path] | None = None,
+    documented: Path = DOCUMENTED,
 ) -> Iterator[Path]:
     """Run nginx inside the block, and yield the file with the certificate that it shows.
     `mistake`: the documented text, and its replacement. `identity`: key and chain, else new ones
-    for the name."""
+    for the name. `documented`: the file of the documentation."""
     folder.mkdir()
     key, chain = identity or _identity(folder, name)
-    whole = _configured(folder, (key, chain), (name, port, editor), mistake)
+    text = documented.read_text()
+    whole = _configured(folder, (key, chain), (name, port, editor), text, mistake)
     log = folder / "log"
     with log.open("wb") as out:
         process = subprocess.Popen(
@@ -42,12 +45,15 @@ def nginx(
 
 
 def _configured(
-    folder: Path, identity: tuple[Path, Path], at: tuple[str, int, int], mistake: tuple[str, str]
+    folder: Path,
+    identity: tuple[Path, Path],
+    at: tuple[str, int, int],
+    text: str,
+    mistake: tuple[str, str],
 ) -> Path:
-    """The documented file for a name, a port and the editor's port, in a configuration of nginx."""
+    """The documented file (`text`) for a name, a port and the editor's port, in a configuration of nginx."""
     key, chain = identity
     name, port, editor = at
-    text = DOCUMENTED.read_text()
     documented, instead = mistake
     assert documented in text
     changes = {
@@ -55,8 +61,8 @@ def _configured(
         "robots.example.org;": f"{name};",
         "/etc/ssl/certs/robots.example.org.pem": str(chain),
         "/etc/ssl/private/robots.example.org.key": str(key),
-        "127.0.0.1:8000": f"127.0.0.1:{editor}",
-        "127.0.0.1:8001": f"127.0.0.1:{editor + 1}",
+        ":8000": f":{editor}",
+        ":8001": f":{editor + 1}",
     }
     text = text.replace(documented, instead) if documented else text
     for old, new in changes.items():

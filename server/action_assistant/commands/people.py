@@ -152,7 +152,7 @@ def _link_person(options: argparse.Namespace) -> int:
         data = options.data.resolve()
         if names_server(options) or not data.is_dir():
             raise
-        from action_assistant.editor.people.members import make_offline
+        from action_assistant.editor.people.offline_links import make_offline
 
         keys = Keys.known(data)
         try:
@@ -226,7 +226,7 @@ def _end_person(options: argparse.Namespace) -> int:
         data = options.data.resolve()
         if names_server(options) or not data.is_dir():
             raise
-        from action_assistant.editor.people.members import known_offline
+        from action_assistant.editor.people.offline_links import known_offline
 
         persons = known_offline(data, options.person)
         if not persons:

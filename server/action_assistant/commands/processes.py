@@ -46,6 +46,19 @@ def _add_editor(editor: argparse.ArgumentParser) -> None:
     _runners(editor)
     _logging(editor)
     editor.add_argument(
+        "--cluster-listen",
+        default="",
+        metavar="HOST:PORT",
+        help="where this editor listens for the other editors of its Postgres: an address that they alone "
+        "can reach, since nothing is encrypted there",
+    )
+    editor.add_argument(
+        "--cluster-url",
+        default="",
+        metavar="URL",
+        help="where they find it; default: http:// and --cluster-listen",
+    )
+    editor.add_argument(
         "--runner-port", type=settings.port_number, metavar="N", help="default: the next port"
     )
     editor.set_defaults(handler=_editor)
@@ -254,6 +267,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         port=options.port,
         runner_port=runner_port,
         sites=sites_of(options, runner_port),
+        cluster=settings.cluster(options.cluster_listen, options.cluster_url),
         hosts=settings.more_hosts(),
         limits=settings.limits(),
         load=settings.load_limits(),
@@ -334,6 +348,7 @@ def _editor(options: argparse.Namespace) -> int:
         identity=_identity(chosen, chosen.port),
         direct=settings.direct_sockets(),
         publish=lambda url: published(data, "editor", url),
+        inside=None if chosen.cluster is None else (chosen.cluster.host, chosen.cluster.port),
     )
     return 0
 

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import anyio
 from litestar import Litestar, Request
@@ -37,6 +37,8 @@ from action_assistant.editor.api import (
     view,
 )
 from action_assistant.editor.api.graph_guard import guarded
+from action_assistant.editor.cluster.chores import CHORES, done_by_one
+from action_assistant.editor.cluster.owners import Alone, Here, Owners
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people import audit_facts
@@ -74,8 +76,11 @@ from action_assistant.web.monitoring.status import Activity
 from action_assistant.web.network.addresses import Addresses, addresses_of
 from action_assistant.web.notifications.receivers import receivers_of
 from action_assistant.web.notifications.routes import notification_routes
-from action_assistant.web.server.application import application
+from action_assistant.web.server.application import Application, application
 from action_assistant.web.workers.lanes import run_here
+
+if TYPE_CHECKING:  # slow to load, and one editor alone does without
+    from action_assistant.editor.cluster.peers import Peers
 
 log: Final = logging.getLogger(__name__)
 
@@ -89,12 +94,19 @@ async def open_services(
     revoked: Revocations | None = None,
     audit: AuditLog | None = None,
     people_files: PeopleFiles | None = None,
+    owners: Owners | None = None,
 ) -> AsyncIterator[EditorServices]:
     """Return a context with the services of the editor, without its HTTP side; they are closed at
     its end. `revoked`: the revoked sessions and links, None to read them. Raise CannotStart if the
     database cannot be used."""
     revoked = revoked or Revocations(settings.data)
-    journal = await Journal.open(settings.database, branch="editor", fold=h.fold, at_once=True)
+    journal = await Journal.open(
+        settings.database,
+        branch="editor",
+        fold=h.fold,
+        at_once=True,
+        several=settings.cluster is not None,
+    )
     try:
         # Ours from here on; until now `move` may have taken the graphs elsewhere.
         await asyncio.to_thread(
@@ -107,10 +119,11 @@ async def open_services(
         async with (
             EditorWorkers.opened() as workers,
             epochs.living_in(journal, settings.data) as epoch,
+            _owners(settings, journal, owners) as owning,
         ):
             people = await People.known(journal)
             services = EditorServices(
-                settings, journal, people, epoch, revoked, workers, audit, people_files
+                settings, journal, people, epoch, revoked, workers, audit, people_files, owning
             )
             try:
                 await services.rights.refresh()
@@ -118,28 +131,78 @@ async def open_services(
                     services.invitations.opened(),
                     services.members.opened(),
                     services.token_log.opened(),
-                    services.change_index.kept_up(),
-                    services.inboxes.kept_up(),
-                    services.notifications.sending(),
                     services.graph_checks.kept_up(),
                     services.audit.writing(journal),
-                    AuditRetention(journal, settings.audit_days, kept_for_incidents).sweeping(),
+                    _chores(services),
                 ):
                     await services.versions.write_releases()
-                    if new:
+                    if new and isinstance(await owning.owner(CHORES), Here):
                         await _greet(services, paths.examples())
                     yield services
             finally:
                 await services.rooms.close()
+                if services.peers is not None:
+                    await services.peers.aclose()
+                if services.locks is not None:
+                    await services.locks.aclose()
     finally:
         await journal.close()
 
 
-def create_app(settings: EditorSettings) -> ASGIApp:
+@asynccontextmanager
+async def _owners(
+    settings: EditorSettings, journal: Journal, given: Owners | None
+) -> AsyncIterator[Owners]:
+    """Return a context with the owners of graphs: those that are given, or this editor alone, or several
+    editors of one database."""
+    if given is not None or settings.cluster is None:
+        yield given or Alone()
+        return
+    from action_assistant.editor.cluster.same_token import require_same_token  # slow to load
+    from action_assistant.editor.cluster.shared_owners import SharedOwners
+
+    async with SharedOwners.joined(journal, settings.database, settings.cluster.url) as owners:
+        await require_same_token(journal, Keys.of(settings.data).relay_key)
+        yield owners
+
+
+@asynccontextmanager
+async def _chores(services: EditorServices) -> AsyncIterator[None]:
+    """Return a context during which one of all editors does what is done once: indexes, mentions, messages
+    and the retention of the audit."""
+    days = services.settings.audit_days
+
+    @asynccontextmanager
+    async def doing() -> AsyncIterator[None]:
+        async with (
+            services.change_index.kept_up(),
+            services.inboxes.kept_up(),
+            services.notifications.sending(),
+            AuditRetention(services.journal, days, kept_for_incidents).sweeping(),
+        ):
+            yield
+
+    if services.settings.cluster is None:
+        async with doing():
+            yield
+        return
+    from action_assistant.editor.cluster.others_changes import OthersChanges
+
+    changes = OthersChanges(services.journal, services.refresh_people, services.rights.refresh)
+    async with changes.taken_up(), done_by_one(services.owners, doing):
+        yield
+
+
+def create_app(settings: EditorSettings, owners: Owners | None = None) -> Application:
     """Return the editor as an ASGI application, and prepare its database. Raise CannotStart if the
     database or the data folder cannot be used."""
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
-    Journal.prepare(settings.database, "editor", copies=settings.data / before_upgrade.FOLDER)
+    Journal.prepare(
+        settings.database,
+        "editor",
+        copies=settings.data / before_upgrade.FOLDER,
+        several=settings.cluster is not None,
+    )
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
     database_location.remember(settings.data, settings.database)
     receivers_of(settings.notifications)
@@ -168,7 +231,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_services(settings, revoked, audit, people_files) as services:
+        async with open_services(settings, revoked, audit, people_files, owners) as services:
             app_state.open(services)
             async with monitoring.watching(WatchedEditor(services)):
                 yield
@@ -202,7 +265,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         confirmations,
         audit,
     )
-    return application(
+    made = application(
         [
             *signing_in,
             *provider.routes(by_provider),
@@ -233,7 +296,33 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         more_runners=[port for each in settings.sites[1:] if (port := port_of(each)) is not None],
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,
+        relay=None if settings.cluster is None else partial(_relaying, app_state),
     )
+    if settings.cluster is not None:
+        made.entrance = _entrance(app_state, made, keys)
+        made.leave = lambda: app_state.services.rooms.move_away()
+    return made
+
+
+def _relaying(app_state: EditorState, app: ASGIApp) -> ASGIApp:
+    """Return an application that relays what is of graphs of other editors, and passes the rest to `app`."""
+    from action_assistant.editor.cluster.relay import Relay  # slow to load
+
+    def peers() -> "Peers":
+        found = app_state.services.peers
+        if found is None:
+            raise RuntimeError("this editor is the only one")
+        return found
+
+    return Relay(app, lambda stream: app_state.services.rooms.owned(stream), peers)
+
+
+def _entrance(app_state: EditorState, made: Application, keys: Keys) -> ASGIApp:
+    from action_assistant.editor.api.entrance import Entrance  # slow to load
+    from action_assistant.editor.cluster.relay_seal import RelaySeal
+
+    seal = RelaySeal(keys.relay_key)
+    return Entrance(made.access.relayed, seal, lambda: app_state.services.rooms)
 
 
 def _addresses(settings: EditorSettings) -> Addresses:

@@ -1,6 +1,6 @@
 """The services of the editor process, and the state that its routes are given."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from litestar import Request
 
@@ -11,6 +11,7 @@ from action_assistant.editor.catalogue.graph_pages import GraphPages
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.graph_rights import GraphRights
 from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.cluster.locks import alone
 from action_assistant.editor.cluster.owners import Alone, Owners
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
@@ -46,6 +47,10 @@ from action_assistant.web.notifications.messages import Message
 from action_assistant.web.notifications.receivers import receivers_of
 from action_assistant.web.notifications.sender import Notifications
 
+if TYPE_CHECKING:  # slow to load, and one editor alone does without
+    from action_assistant.editor.cluster.database_locks import DatabaseLocks
+    from action_assistant.editor.cluster.peers import Peers
+
 
 class EditorServices:
     """The services of the editor, built around an open journal."""
@@ -71,9 +76,16 @@ class EditorServices:
         self.workers = workers
         self.colours = PersonColours()
         self.owners: Owners = owners or Alone()
+        self.peers = None if settings.cluster is None else _peers(self.owners, keys)
         self.rooms = Rooms(
-            journal, run_in_worker=workers.graphs, tried=workers.edits, owners=self.owners
+            journal,
+            run_in_worker=workers.graphs,
+            tried=workers.edits,
+            owners=self.owners,
+            peers=self.peers,
         )
+        self.locks = None if settings.cluster is None else _locks(settings.database)
+        exclusively = alone if self.locks is None else self.locks.exclusively
         self.connection_limits = ConnectionLimits(limits=settings.limits, load=settings.load)
         self.rate_limits = ByteRateLimits(
             limits=settings.limits, per_minute=settings.load.mib_a_minute << 20
@@ -81,7 +93,7 @@ class EditorServices:
         self.graph_reader = GraphReader(journal, self.rooms, workers.graphs)
         self.rights = GraphRights(journal, self.rooms, RulesFile(settings.data, keys), keys)
         self.graph_checks = GraphChecks(
-            journal, self.rooms, self.graph_reader, self.rights.caller_sees
+            journal, self.rooms, self.graph_reader, self.rights.caller_sees, exclusively
         )
         self.catalogue = Catalogue(
             journal,
@@ -113,7 +125,7 @@ class EditorServices:
         )
         self.reception = Reception(self.invitations, self.members)
         self.token_log = TokenLog(journal)
-        self.change_index = ChangeIndex(journal, workers.graphs)
+        self.change_index = ChangeIndex(journal, workers.graphs, exclusively)
         public = settings.reached.public
         receivers = receivers_of(settings.notifications, KINDS)
         self.notifications = Notifications(
@@ -135,6 +147,13 @@ class EditorServices:
             journal, self.rooms, self.drafts, self.change_index, people, self.graph_checks
         )
 
+    async def refresh_people(self) -> None:
+        """Read again what another editor may have changed of persons and links. Raise Unavailable if the
+        journal cannot be read."""
+        await self.people.refresh()
+        await self.invitations.refresh()
+        await self.members.refresh()
+
     async def _is_seen_by_all(self, message: Message) -> bool:
         return await self.rights.may_see(str(message.facts["id"]), ANYBODY)
 
@@ -147,6 +166,19 @@ class EditorServices:
             return await self.rights.may_see(graph, Identity(Person(person, "", "viewer")))
         identity = Identity(Person(person, member.name, member.role), frozenset(member.groups))
         return member.ended_at is None and await self.rights.may_see(graph, identity)
+
+
+def _peers(owners: Owners, keys: Keys) -> "Peers":
+    from action_assistant.editor.cluster.peers import Peers
+    from action_assistant.editor.cluster.relay_seal import RelaySeal
+
+    return Peers(owners, RelaySeal(keys.relay_key))
+
+
+def _locks(database: str) -> "DatabaseLocks":
+    from action_assistant.editor.cluster.database_locks import DatabaseLocks
+
+    return DatabaseLocks(database)
 
 
 class EditorState:

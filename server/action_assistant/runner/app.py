@@ -15,7 +15,6 @@ from typing import Final
 import anyio
 import msgspec
 from litestar import Litestar
-from litestar.types import ASGIApp
 
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
@@ -82,7 +81,7 @@ from action_assistant.web.notifications.messages import Message
 from action_assistant.web.notifications.receivers import receivers_of
 from action_assistant.web.notifications.routes import notification_routes
 from action_assistant.web.notifications.sender import Notifications
-from action_assistant.web.server.application import application
+from action_assistant.web.server.application import Application, application
 
 log: Final = logging.getLogger(__name__)
 
@@ -312,7 +311,7 @@ def _database(settings: RunnerSettings) -> str:
     return f"sqlite:///{_file(settings)}"
 
 
-def create_app(settings: RunnerSettings) -> ASGIApp:
+def create_app(settings: RunnerSettings) -> Application:
     """Return the runner as an ASGI application, and prepare its database. Raise CannotStart if the
     database, the folder of behaviours or the file of notifications cannot be used."""
     if settings.behaviours is not None:

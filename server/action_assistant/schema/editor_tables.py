@@ -244,7 +244,8 @@ mention_read: Final = Table(
 outbox, receiver = outbox_tables(EDITOR)
 #: One of several editors that share this database, with the slot in which it writes. `life`: a random number of
 #: its process. `url`: where it takes requests of other editors. `beat_at`: when it last said that it lives
-#: (µs UTC, by the clock of the database); `draining_at`: since when it gives its rooms up.
+#: (µs UTC, by the clock of the database); `draining_at`: since when it gives its rooms up; `proof`:
+#: an HMAC that all editors with its token have.
 editor: Final = Table(
     "editor",
     EDITOR,
@@ -254,6 +255,7 @@ editor: Final = Table(
     Column("version", Text, nullable=False),
     Column("beat_at", BigInteger, nullable=False),
     Column("draining_at", BigInteger),
+    Column("proof", LargeBinary),
 )
 #: The editor that owns a stream, by its life, since it took the stream with this epoch. It only shows where to
 #: ask; `head.epoch` says who may append.

@@ -46,6 +46,10 @@ class Two:
     def check_again(self, stream: str) -> None:
         """Do nothing: nothing is cached."""
 
+    async def drain(self) -> None:
+        """Take no streams any more."""
+        self.draining = True
+
     def when_lost(self, hear: Callable[[str], object]) -> None:
         """Keep whom to tell."""
         self.hear = hear

@@ -24,7 +24,7 @@ from action_assistant.commands.backups import options
 from action_assistant.commands.doctor.database_checks import has_events, oldest_at
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.editor.log import database_location
-from action_assistant.editor.people.members import OfflineLink
+from action_assistant.editor.people.offline_links import OfflineLink
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state as backups
 from action_assistant.journal.copies.backup_state import BackupState, backup_state

@@ -25,9 +25,9 @@ from action_assistant.settings import reached
 from action_assistant.share_links import is_ours
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.version import VERSION
-from action_assistant.web.auth.access import REFUSED_SOCKET
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.provider_settings import provider_of
+from action_assistant.web.http.refusals import REFUSED_SOCKET
 from action_assistant.web.network.certificate import Certificate
 
 _PATIENCE_S: Final = 3.0

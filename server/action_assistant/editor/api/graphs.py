@@ -404,7 +404,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
                 )
             return found
 
-        async with services.rooms.enter(graph_stream(graph_id)) as room:
+        async with services.rooms.reach(graph_stream(graph_id)) as room:
             edit = await store(room, person.id, compute, lambda found: found.update)
         return MergedGraph(edit.seq, edit.before > seq, edit.computed.problems)
 

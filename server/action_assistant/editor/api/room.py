@@ -20,10 +20,11 @@ from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
 from action_assistant.logs import about
-from action_assistant.web.auth.access import Needs, identity_of, person_of, plain, refuse
+from action_assistant.web.auth.access import Needs, identity_of, person_of, plain
 from action_assistant.web.auth.caller import client_network, origin_of
 from action_assistant.web.auth.graph_rules import MAY_NOT_EDIT
 from action_assistant.web.auth.rights import Allowed, may
+from action_assistant.web.http.refusals import refuse
 from action_assistant.web.server.direct import DirectSocket, direct_socket
 
 log: Final = logging.getLogger(__name__)

@@ -252,7 +252,7 @@ class Catalogue:
             row.name if name is None else name,
             row.description if description is None else description,
         )
-        async with self._rooms.enter(h.graph_stream(graph)) as room:
+        async with self._rooms.reach(h.graph_stream(graph)) as room:
             await server_edits.rename(
                 room,
                 author,
@@ -277,7 +277,7 @@ class Catalogue:
         refused: list[RefusedUse] = []
         for graph in dict.fromkeys(graphs):
             try:
-                async with self._rooms.enter(h.graph_stream(graph)) as room:
+                async with self._rooms.reach(h.graph_stream(graph)) as room:
                     if await server_edits.call_actions(
                         room, author, before, new_name, run_in_worker=self._run_in_worker
                     ):

@@ -12,6 +12,7 @@ import msgspec
 from action_assistant.editor.catalogue.graph_facts import CountsInside, Facts, GraphFacts
 from action_assistant.editor.catalogue.graph_names import GraphNames, NamedGraph
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.cluster.locks import Exclusively, alone
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo, Inside
 from action_assistant.editor.documents.thumbnails import digest_of
@@ -108,11 +109,12 @@ class GraphChecks:
         rooms: Rooms,
         reader: GraphReader,
         caller_sees: Callable[[str], Awaitable[bool]] = sees_every_graph,
+        exclusively: Exclusively = alone,
     ) -> None:
         self.caller_sees: Final = caller_sees
         self._rooms = rooms
         self._reader = reader
-        self.facts: Final = GraphFacts(journal)
+        self.facts: Final = GraphFacts(journal, exclusively)
         self._later: dict[str, int] = {}  # the newest change by graph
         self._wanted = asyncio.Event()
         self._idle = asyncio.Event()

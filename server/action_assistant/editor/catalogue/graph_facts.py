@@ -19,6 +19,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 from sqlalchemy import Connection, Row, delete, func, insert, select, update
 
+from action_assistant.editor.cluster.locks import Exclusively, alone
 from action_assistant.editor.documents.contents import Counts, GraphInfo
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
@@ -62,6 +63,10 @@ class Facts(msgspec.Struct, frozen=True):
     is_current: bool = True
 
 
+#: The name of work on the table.
+_TABLE: Final = "facts of graphs"
+
+
 class ChangedGraph(NamedTuple):
     """A graph after its newest change, `seq`. `name`, `description`: as its catalogue has them."""
 
@@ -75,8 +80,9 @@ class GraphFacts:
     """Remembers the facts about graphs: in memory, and in a table for lists and for the next
     start."""
 
-    def __init__(self, journal: Journal) -> None:
+    def __init__(self, journal: Journal, exclusively: Exclusively = alone) -> None:
         self._journal = journal
+        self._exclusively = exclusively
         self._known = LruCache[str, Facts](_REMEMBERED, _NAMES)
         self._unwritten: dict[str, Facts] = {}
         self._changed = asyncio.Event()
@@ -113,7 +119,8 @@ class GraphFacts:
         written."""
         for start in range(0, len(changed), _ROWS):
             some = changed[start : start + _ROWS]
-            await self._journal.derive(partial(_note_changes, some))
+            async with self._exclusively(_TABLE):
+                await self._journal.derive(partial(_note_changes, some))
 
     async def write(self) -> None:
         """Write the facts that are in memory only, so that queries of the table find them."""
@@ -144,7 +151,8 @@ class GraphFacts:
         for start in range(0, len(graphs), _ROWS):
             some = [(graph, unwritten[graph]) for graph in graphs[start : start + _ROWS]]
             try:
-                await self._journal.derive(partial(_store, some))
+                async with self._exclusively(_TABLE):
+                    await self._journal.derive(partial(_store, some))
             except Refused as error:  # the next start computes them again
                 log.warning("facts of %d graphs are not stored: %s", len(some), error.detail)
 

@@ -2,14 +2,16 @@
 
 import time
 from collections.abc import Awaitable, Callable
-from typing import Final, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Final, Generic, NamedTuple, TypeVar
 
 from action_assistant.editor.interchange.document_edits import calling_actions, renaming, restoring
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.batch import HELD_S
-from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import Overtaken
 from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+if TYPE_CHECKING:  # slow to load
+    from action_assistant.editor.rooms.remote_room import AnyRoom
 
 T = TypeVar("T")
 
@@ -60,7 +62,7 @@ class _Computing(Generic[T]):
 
 
 async def store(
-    room: Room,
+    room: "AnyRoom",
     author: str,
     compute: Callable[[bytes, int], Awaitable[T]],
     update_of: Callable[[T], bytes],
@@ -96,7 +98,7 @@ async def store(
 
 
 async def store_update(
-    room: Room,
+    room: "AnyRoom",
     author: str,
     compute: Callable[[bytes, int], Awaitable[bytes]],
     *,
@@ -107,7 +109,7 @@ async def store_update(
 
 
 async def rename(
-    room: Room,
+    room: "AnyRoom",
     author: str,
     *,
     name: str | None,
@@ -128,7 +130,7 @@ async def rename(
 
 
 async def call_actions(
-    room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
+    room: "AnyRoom", author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
 ) -> bool:
     """Rename all actions called `before` to `name`, as one edit in the name of `author`. Return
     whether there was one. Raise the errors of `store`."""
@@ -139,7 +141,7 @@ async def call_actions(
 
 
 async def restore(
-    room: Room, author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
+    room: "AnyRoom", author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
 ) -> StoredEdit[bytes]:
     """Restore a graph to the content of the document `then` (encoded) by an ordinary edit in the
     name of `author`, which can be undone. Its comments stay as they are now. Raise the errors of

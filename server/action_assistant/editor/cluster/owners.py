@@ -52,6 +52,9 @@ class Owners(Protocol):
     def draining(self) -> bool:
         """Return whether this editor gives its rooms up and takes no others, because it ends."""
 
+    async def drain(self) -> None:
+        """Take no streams any more, and let other editors take those of this one, because it ends."""
+
     def when_lost(self, hear: Callable[[str], object]) -> None:
         """Call `hear` from now on with each stream that this editor has owned and that another one has
         taken, or that it may own no longer because the database does not hear it. Its room has to close
@@ -73,6 +76,9 @@ class Alone:
 
     def check_again(self, stream: str) -> None:
         """Do nothing: the owner is always this editor."""
+
+    async def drain(self) -> None:
+        """Do nothing: there is nobody else."""
 
     def when_lost(self, hear: Callable[[str], object]) -> None:
         """Do nothing: no stream is ever lost."""

@@ -15,6 +15,7 @@ import anyio
 import msgspec
 from sqlalchemy import Connection, Table, and_, delete, func, insert, select, tuple_
 
+from action_assistant.editor.cluster.locks import Exclusively, alone
 from action_assistant.editor.history.index_queries import (
     COLUMNS,
     FORM,
@@ -51,10 +52,16 @@ _TABLES: Final = (key_change, overwritten_value)
 class ChangeIndex:
     """Maintains an index, in the database, of the keys that each event of a graph changed. It is
     derived from the log and may be deleted at any time. Its methods raise Unavailable while the
-    journal cannot be read or written."""
+    journal cannot be read or written. `exclusively`: keeps other editors from the same index."""
 
-    def __init__(self, journal: Journal, run_in_worker: RunInWorker = run_here) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        run_in_worker: RunInWorker = run_here,
+        exclusively: Exclusively = alone,
+    ) -> None:
         self._journal = journal
+        self._exclusively = exclusively
         self._run_in_worker = run_in_worker
         self._catching_up: defaultdict[str, anyio.Lock] = defaultdict(anyio.Lock)
 
@@ -64,6 +71,13 @@ class ChangeIndex:
         Unavailable if the journal cannot be read or written."""
         wanted = await self._journal.newest(graph_stream(graph)) if seq is None else seq
         async with self._catching_up[graph]:
+            done = await self.head(graph)
+            if done >= wanted:
+                return done
+            return await self._bring_up(graph, wanted)
+
+    async def _bring_up(self, graph: str, wanted: int) -> int:
+        async with self._exclusively(f"index {graph}"):
             done = await self.head(graph)
             while done < wanted and (found := await self.value(growth, graph, ROWS)) is not None:
                 if found.unreadable:

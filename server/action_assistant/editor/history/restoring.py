@@ -224,7 +224,7 @@ class Restoring:
         last change then. Raise NotFound for an unknown graph, Conflict for an unknown change,
         Unavailable if the journal cannot be read or written."""
         then = await self._graph_reader.at(graph, seq)
-        async with self._rooms.enter(h.graph_stream(graph)) as room:
+        async with self._rooms.reach(h.graph_stream(graph)) as room:
             edit = await server_edits.restore(
                 room, author, then.state, run_in_worker=self._run_in_worker
             )
@@ -241,7 +241,7 @@ class Restoring:
                 f"This graph has the changes 1 to {upto}; there is no {seq}.",
                 where={"path": "/seq"},
             )
-        async with self._rooms.enter(h.graph_stream(graph)) as room:
+        async with self._rooms.reach(h.graph_stream(graph)) as room:
             edit = await store_update(
                 room,
                 author,
@@ -270,7 +270,7 @@ class Restoring:
                 raise NotFound("This person changed nothing then.")
             return found
 
-        async with self._rooms.enter(h.graph_stream(graph)) as room:
+        async with self._rooms.reach(h.graph_stream(graph)) as room:
             edit = await store(room, author, compute, lambda found: found.update)
         if edit.changed:
             body = h.GraphReverted(edits.author, first, last, edit.seq)

@@ -7,7 +7,7 @@ import logging
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 from functools import partial
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import anyio
 import msgspec
@@ -32,7 +32,6 @@ from action_assistant.editor.library.action_uses import (
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import BadInput, Conflict, Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
@@ -40,6 +39,9 @@ from action_assistant.umrf.action_updates import Renames
 from action_assistant.umrf.model import Action
 from action_assistant.web.http.plain_texts import require_plain
 from action_assistant.web.workers.lanes import HOPELESS, RunInWorker
+
+if TYPE_CHECKING:  # slow to load
+    from action_assistant.editor.rooms.remote_room import AnyRoom
 
 log: Final = logging.getLogger(__name__)
 
@@ -268,11 +270,11 @@ class LibraryEdits:
         if len({each.graph for each in graphs}) < len(graphs):
             raise BadInput("A graph is named twice.", where={"path": "/graphs"})
         async with AsyncExitStack() as open_rooms:
-            updates: list[tuple[GraphMoment, Room, bytes]] = []
+            updates: list[tuple[GraphMoment, AnyRoom, bytes]] = []
             for each in graphs:
                 await self._catalogue.require(each.graph, "graph")
                 room = await open_rooms.enter_async_context(
-                    self._rooms.enter(h.graph_stream(each.graph))
+                    self._rooms.reach(h.graph_stream(each.graph))
                 )
                 then = await _seen(room, each)
                 update = await self._graph_reader.ask(
@@ -280,8 +282,7 @@ class LibraryEdits:
                 )
                 updates.append((each, room, update))
             for each, room, _ in updates:
-                if room.seq != each.seq:
-                    raise _changed(each, room.seq)
+                await _seen(room, each)
 
             updated: list[UpdatedGraph] = []
 
@@ -322,7 +323,7 @@ class LibraryEdits:
             update: bytes = await self._graph_reader.ask(library_updates.taking, sight, source, aid)
             return update
 
-        async with self._rooms.enter(h.graph_stream(action)) as room:
+        async with self._rooms.reach(h.graph_stream(action)) as room:
             await self._adapt(room, action, taking, author, source, name)
         return await self._catalogue.get(action)
 
@@ -350,7 +351,7 @@ class LibraryEdits:
                 library_updates.replacing, GraphAtSeq(action, now, state), body
             )
 
-        async with self._rooms.enter(h.graph_stream(action)) as room:
+        async with self._rooms.reach(h.graph_stream(action)) as room:
             await self._adapt(room, action, replacing, author, GraphAtSeq("", 0, b""), name)
         return await self._catalogue.get(action)
 
@@ -377,7 +378,7 @@ class LibraryEdits:
 
     async def _adapt(
         self,
-        room: Room,
+        room: "AnyRoom",
         document: str,
         compute: Callable[[bytes, int], Awaitable[bytes]],
         author: str,
@@ -401,7 +402,7 @@ class LibraryEdits:
         return [await self._graph_reader.now(view.id) for view in views]
 
 
-async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
+async def _seen(room: "AnyRoom", moment: GraphMoment) -> GraphAtSeq:
     """Return the graph in this room if its last change is still the one that a person has seen
     (`moment`); raise Conflict if not."""
     found = await room.now()

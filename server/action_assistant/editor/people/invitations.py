@@ -67,8 +67,7 @@ class Invitation(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Invitations:
-    """All invitations ever made, held in memory, so that using and revoking one needs no database.
-    Only this process adds invitations."""
+    """All invitations ever made, held in memory, so that using and revoking one needs no database."""
 
     def __init__(self, journal: Journal, people: People, keys: Keys, revoked: Revocations) -> None:
         self._journal = journal
@@ -101,6 +100,11 @@ class Invitations:
             if self._recording is not None:
                 self._recording.cancel()
                 await asyncio.wait([self._recording])
+
+    async def refresh(self) -> None:
+        """Read all invitations again, since another editor may have changed some. What was revoked here and
+        is not stored yet stays revoked. Raise Unavailable if the journal cannot be read."""
+        await self._read()
 
     def all(self) -> list[Invitation]:
         """Return all invitations, newest first."""
@@ -236,26 +240,28 @@ class Invitations:
         which = select(editor_tables.invitation)
         if new is not None:
             which = which.where(editor_tables.invitation.c.id == new)
-        for row in await self._journal.query(which):
+        rows = await self._journal.query(which)
+        guest = editor_tables.guest
+        came = await self._journal.query(select(guest).order_by(guest.c.at)) if new is None else []
+        guests: dict[str, list[Guest]] = {}
+        for each in came:
+            person = Guest(PersonRef(each.person, each.name), h.when(each.at))
+            guests.setdefault(each.invitation, []).append(person)
+        for row in rows:
             over = row.revoked_at is not None
+            known = self._made.get(row.id)
+            if known is not None and known.unrecorded:
+                continue
             self._made[row.id] = Invitation(
                 id=row.id,
                 role=row.role,
                 label=row.label,
                 made_at=h.when(row.made_at),
                 made_by=PersonRef(row.made_by, ""),
-                guests=[],
+                guests=guests.get(row.id, []),
                 revoked_at=h.when(row.revoked_at) if over else None,
                 revoked_by=PersonRef(row.revoked_by, "") if over else None,
             )
-        if new is not None:
-            return
-        for each in await self._journal.query(
-            select(editor_tables.guest).order_by(editor_tables.guest.c.at)
-        ):
-            if each.invitation in self._made:
-                guest = Guest(PersonRef(each.person, each.name), h.when(each.at))
-                self._made[each.invitation].guests.append(guest)
 
     def _view(self, link: Invitation) -> Invitation:
         """Return an invitation with the present names of people, and with its secret link unless it

@@ -11,7 +11,6 @@ taken over into the log when the editor starts or the link is used.
 import asyncio
 import hmac
 import logging
-import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
@@ -27,6 +26,7 @@ from action_assistant import private_files
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.log import people_events as e
 from action_assistant.editor.people.late_records import LateRecords
+from action_assistant.editor.people.offline_links import LINKS, MOST_HOURS, offline_in
 from action_assistant.editor.people.people import People
 from action_assistant.errors import (
     BadInput,
@@ -39,12 +39,11 @@ from action_assistant.errors import (
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.kit.moments import sent_us
-from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth import people_files
-from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.web.auth.caller import Origin, acting_for, origin_in
 from action_assistant.web.auth.keys import Keys, PersonRef
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
@@ -55,11 +54,13 @@ log: Final = logging.getLogger(__name__)
 
 NAME_LIMIT: Final = 60  # characters
 LINK_HOURS: Final = 72.0
-MOST_HOURS: Final = 30 * 24.0
-_LINKS: Final = "links"
+
+_USED: Final = (
+    "This link was used already; it lets one browser in. On a browser that is signed in, add this device, or ask "
+    "for a new link."
+)
 _MOST: Final = 1000  # persons that are not ended
 _MOST_GROUPS: Final = 100
-_LATEST: Final = 250_000_000_000.0  # seconds since 1970: before the year 10000
 
 
 class PersonalLink(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -111,18 +112,9 @@ class Member(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     provider: ByProvider | None = None
 
 
-class OfflineLink(msgspec.Struct, frozen=True):
-    """A personal link that the command line made while no server answered. `expires`: seconds
-    since 1970."""
-
-    id: str
-    person: PersonFile
-    expires: float
-
-
 class Members:
     """All persons with personal links, and all groups, held in memory, so that ending one needs no
-    database. Only this process adds them."""
+    database."""
 
     def __init__(
         self,
@@ -138,7 +130,7 @@ class Members:
         self._keys = keys
         self._revoked = revoked
         self._files = files
-        self._offline = data / people_files.FOLDER / _LINKS
+        self._offline = data / people_files.FOLDER / LINKS
         self._members: dict[str, Member] = {}
         self._owner_of: dict[str, str] = {}  # link -> person
         self._groups: dict[str, Group] = {}
@@ -168,6 +160,12 @@ class Members:
             yield
         finally:
             await self._late.aclose()
+
+    async def refresh(self) -> None:
+        """Read all persons and groups again, since another editor may have changed some. What was ended or
+        used here and is not stored yet stays so. Raise Unavailable if the journal cannot be read."""
+        async with self.turn:
+            await self._read()
 
     def all(self, *, with_links: bool) -> list[Member]:
         """Return all persons by name; those who were ended last."""
@@ -391,9 +389,22 @@ class Members:
         except Unavailable:
             self._set_link(link, None)  # nobody came in by it
             raise
+        if await self._first_use(link) != session:  # another editor let somebody in meanwhile
+            await self._read(member.id)
+            raise Unauthenticated(_USED)
         # A backup that is restored later does not know of this use; the mark stays.
         await asyncio.to_thread(_try, lambda: self._revoked.add(link))
         return _file_of(self._one(member.id))
+
+    async def _first_use(self, link: str) -> str:
+        """Return the session that the log lets in by a link: the first one."""
+        event = editor_tables.editor_event.c
+        uses = select(event.body).where(event.stream == h.PEOPLE, event.kind == e.LINK_USED)
+        for row in await self._journal.query(uses.order_by(event.seq)):
+            if msgspec.json.decode(row.body, type=e.LinkUsed).id == link:
+                origin = origin_in(row.body)
+                return "" if origin is None else origin.session
+        return ""
 
     async def device_added(self, person: str, session: str, browser: str, address: str) -> None:
         """Store in the log that a person has added a device. Raise Unavailable if that fails."""
@@ -407,10 +418,7 @@ class Members:
         if member.ended_at is not None or self._revoked.person_ended(member.id):
             raise Withdrawn("Your access was ended by an owner. Ask for a new link.")
         if found.used_at is not None or self._revoked.holds(link):
-            raise Unauthenticated(
-                "This link was used already; it lets one browser in. On a browser that is signed "
-                "in, add this device, or ask for a new link."
-            )
+            raise Unauthenticated(_USED)
         if found.withdrawn_at is not None:
             raise Withdrawn("This link was replaced by a newer one. Ask for that.")
         if datetime.now(UTC) >= found.expires_at:
@@ -421,7 +429,7 @@ class Members:
         """Store a link of the command line in the log, and its person if they are new there."""
         async with self.turn:
             try:
-                offline = await asyncio.to_thread(_offline_in, path)
+                offline = await asyncio.to_thread(offline_in, path)
             except (OSError, private_files.DamagedFile) as error:
                 private_files.log_unreadable(path, error)
                 return
@@ -534,8 +542,8 @@ class Members:
                 made.where(links.c.person == person),
             )
         else:
-            for row in await self._journal.query(select(editor_tables.people_group)):
-                self._groups[row.id] = Group(row.id, row.name)
+            groups = await self._journal.query(select(editor_tables.people_group))
+            self._groups = {row.id: Group(row.id, row.name) for row in groups}
         theirs: dict[str, list[PersonalLink]] = {}
         for row in await self._journal.query(made):
             self._owner_of[row.id] = row.person
@@ -587,41 +595,6 @@ class Members:
         else:
             path = f"/#i={link.id}.{self._keys.secret_of(link.id)}"
         return replace(link, made_by=self._people.person(link.made_by.id), path=path)
-
-
-def _offline_in(path: Path) -> OfflineLink:
-    """Return the link that the command line has stored in a file. Raise OSError or private_files.DamagedFile."""
-    found = private_files.read_json(path, OfflineLink)
-    if not all(0 <= each < _LATEST for each in (found.expires, found.person.until or 0.0)):
-        raise private_files.DamagedFile("it has a time that no calendar has")
-    return found
-
-
-def known_offline(data: Path, text: str) -> list[PersonFile]:
-    """Return the persons in a data folder with this name or id who were not ended."""
-    files, revoked = PeopleFiles(data), Revocations(data)
-    paths = (data / people_files.FOLDER).glob("*.json")
-    found = [each for path in paths if (each := files.get(path.stem)) is not None]
-    return [
-        each
-        for each in found
-        if text.casefold() in {each.name.casefold(), each.id.casefold()}
-        and not revoked.person_ended(each.id)
-    ]
-
-
-def make_offline(data: Path, keys: Keys, name: str, role: Role | None, hours: float) -> str:
-    """Make a personal link in a data folder without a server, and return its path. The person is
-    the one of this name who is there, or a new one. Raise OSError if it cannot be written."""
-    name = " ".join(name.split())[:NAME_LIMIT] or "Owner"
-    same = known_offline(data, name)
-    person = same[0] if same else PersonFile(random_id(), name, "operator")
-    person = person if role is None else replace(person, role=role)
-    link = OfflineLink(random_id(), person, time.time() + min(hours, MOST_HOURS) * 3600)
-    folder = data / people_files.FOLDER / _LINKS
-    make_folder(folder)
-    replace_file(folder / f"{link.id}.json", msgspec.json.encode(link))
-    return f"/#i={link.id}.{keys.secret_of(link.id)}"
 
 
 def _with_news(stored: Member, known: Member | None) -> Member:

@@ -31,8 +31,12 @@ class People:
     @classmethod
     async def known(cls, journal: Journal) -> "People":
         """Return the people whose names are in the journal."""
-        rows = await journal.query(select(editor_tables.person.c.id, editor_tables.person.c.name))
-        return cls(journal, {row.id: row.name for row in rows})
+        return cls(journal, await _stored_names(journal))
+
+    async def refresh(self) -> None:
+        """Read the names again, since another editor may have stored some. Raise Unavailable if the journal
+        cannot be read."""
+        self._names |= await _stored_names(self._journal)
 
     async def seen(self, person: PersonRef) -> None:
         """Store the name of a person if it is new or has changed. A program's token has the name of
@@ -64,6 +68,11 @@ class People:
     def everyone(self) -> list[PersonRef]:
         """Return all people, sorted by name."""
         return sorted((PersonRef(*item) for item in self._names.items()), key=lambda p: p.name)
+
+
+async def _stored_names(journal: Journal) -> dict[str, str]:
+    rows = await journal.query(select(editor_tables.person.c.id, editor_tables.person.c.name))
+    return {row.id: row.name for row in rows}
 
 
 def stored_people(connection: Connection) -> Callable[[str], PersonRef]:

@@ -1,11 +1,11 @@
 """The rooms that are open. Each is loaded once, kept while somebody uses it, and unloaded some seconds later."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
-from typing import Final
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from typing import TYPE_CHECKING, Final
 
-from action_assistant.editor.cluster.owners import Alone, Elsewhere, Here, Owners
+from action_assistant.editor.cluster.owners import Alone, Elsewhere, Here, Owner, Owners
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.rooms.batch import LONGEST, BatchWindow
@@ -16,17 +16,23 @@ from action_assistant.web.auth.caller import outlive_connection
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
+if TYPE_CHECKING:  # slow to load, and one editor alone does without
+    from action_assistant.editor.cluster.peers import Peers
+    from action_assistant.editor.rooms.remote_room import AnyRoom
+
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
 _ANNOUNCEMENT_WINDOWS: Final = 10  # between two announcements of the sequence number
 _ELSEWHERE: Final = "Another editor has this graph open; try again."
+_PATIENCE_S: Final = 1.0  # with a room that is to be moved
 _SILENCE: Final = 10.0  # seconds without a message after which a socket is sent a heartbeat
 
 
 class Rooms:
     """Opens and unloads the rooms of this process, by stream. `run_in_worker` runs work that grows
     with a document; `tried` runs trials of large updates before a room applies them. `owners` says
-    which streams this editor owns; None for the only editor of its database."""
+    which streams this editor owns, and `peers` leads to the others; None for the only editor of its
+    database."""
 
     def __init__(
         self,
@@ -37,9 +43,11 @@ class Rooms:
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
         owners: Owners | None = None,
+        peers: "Peers | None" = None,
     ) -> None:
         self._journal = journal
         self._owners: Final[Owners] = owners or Alone()
+        self._peers = peers
         self._owners.when_lost(self._lose)
         self._run_in_worker = run_in_worker
         self._tried = tried
@@ -51,8 +59,11 @@ class Rooms:
         self._holders: dict[str, int] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._timers: dict[str, asyncio.TimerHandle] = {}
-        self._deleted: set[str] = set()  # since this process began
-        self._closed = False
+        self._deleted: set[str] = set()  # while this process owned them
+        self._taken: set[str] = (
+            set()
+        )  # streams that this editor owns, at least without an open room
+        self._closed = self._moving = False
         self._divergences = 0
         self.metrics: Final = RoomMetrics()
         self._heartbeat = asyncio.create_task(self._send_heartbeats(), name="heartbeat")
@@ -60,13 +71,43 @@ class Rooms:
     @asynccontextmanager
     async def enter(self, stream: str) -> AsyncIterator[Room]:
         """Return a context with the room of a stream, which is loaded if needed and stays loaded
-        during it. Raise Unavailable if it cannot be loaded."""
+        during it. Raise Unavailable if it cannot be loaded, or if another editor owns the stream."""
+        with self._held(stream):
+            yield await self._room(stream)
+
+    @asynccontextmanager
+    async def reach(self, stream: str) -> AsyncIterator["AnyRoom"]:
+        """Return a context with the room of a stream for edits of the server itself, wherever it is open.
+        Raise Unavailable if it cannot be loaded or its editor does not answer."""
+        with self._held(stream):
+            if self._peers is None or isinstance(await self._owners.owner(stream), Here):
+                yield await self._room(stream)
+                return
+        from action_assistant.editor.rooms.remote_room import RemoteRoom
+
+        yield RemoteRoom(stream, self._peers)
+
+    @asynccontextmanager
+    async def owned(self, stream: str) -> AsyncIterator[Owner]:
+        """Return a context with the owner of a stream. If that is this editor, it stays the owner during it
+        and for some seconds, unless another one takes the stream. Raise Unavailable as `Owners` does."""
+        with self._held(stream):
+            owner = await self._owners.owner(stream)
+            if isinstance(owner, Here):
+                self._taken.add(stream)
+                yield owner
+                return
+        yield owner
+
+    @contextmanager
+    def _held(self, stream: str) -> Iterator[None]:
+        """Keep the room of a stream open, if it is, and own the stream, if this editor does."""
         self._holders[stream] = self._holders.get(stream, 0) + 1
         timer = self._timers.pop(stream, None)
         if timer is not None:
             timer.cancel()
         try:
-            yield await self._room(stream)
+            yield
         finally:
             self._holders[stream] -= 1
             if self._holders[stream] == 0:
@@ -135,6 +176,19 @@ class Rooms:
         recovered."""
         return stream in self._deleted
 
+    async def move_away(self) -> None:
+        """Let other editors have the rooms, those with the fewest people first. Each is closed with 1012 when
+        all that was sent to it is stored."""
+        self._moving = True
+        await self._owners.drain()
+        for room in sorted(self.open_rooms(), key=lambda each: len(each.members)):
+            try:
+                async with asyncio.timeout(_PATIENCE_S):
+                    await room.close_if_unused(lambda: False)
+            except TimeoutError:  # its people send again what was not acknowledged
+                room.end()
+            await self._owners.give_up(room.stream)
+
     async def close(self) -> None:
         """Wait until every room has finished its work, and unload all rooms."""
         self._closed = True
@@ -157,7 +211,7 @@ class Rooms:
         room = self._rooms.get(stream)
         if room is not None:
             return room
-        if self._closed:
+        if self._closed or self._moving:
             raise Unavailable("The server is ending.")
         loading = self._loading.get(stream)
         if loading is None:
@@ -194,13 +248,15 @@ class Rooms:
 
     def _unload_later(self, stream: str) -> None:
         """Unload the room of this stream after some seconds, unless it is used again."""
-        if stream in self._rooms and not self._closed:
+        if (stream in self._rooms or stream in self._taken) and not self._closed:
             loop = asyncio.get_running_loop()
             self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
 
     def _lose(self, stream: str) -> None:
         """End the room of a stream at once, since another editor owns it now. What its clients have sent
         and was not acknowledged they send again, to that editor."""
+        self._taken.discard(stream)
+        self._deleted.discard(stream)
         room = self._rooms.get(stream)
         if room is not None:
             room.end()
@@ -222,5 +278,7 @@ class Rooms:
         room = self._rooms.get(stream)
         if room is not None:
             await room.close_if_unused(lambda: stream in self._holders)
-            if stream not in self._rooms and stream not in self._loading:
-                await self._owners.give_up(stream)
+        if not (stream in self._rooms or stream in self._loading or stream in self._holders):
+            self._taken.discard(stream)
+            self._deleted.discard(stream)
+            await self._owners.give_up(stream)

@@ -75,12 +75,12 @@ from action_assistant.web.auth.access import (
     PersonOnly,
     identity_of,
     person_of,
-    refuse,
     require,
 )
 from action_assistant.web.auth.caller import client_network
 from action_assistant.web.auth.graph_seals import Statement
 from action_assistant.web.http.compression import COMPRESSED
+from action_assistant.web.http.refusals import refuse
 from action_assistant.web.server.openapi import MOST_NUMBER, answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once

@@ -50,7 +50,7 @@ from action_assistant.web.auth.rights import Denied, Thing, may, unconfirmed
 from action_assistant.web.auth.roles import OWNER, Permission
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.http.plain_texts import require_plain_address
-from action_assistant.web.http.problems import problem_of
+from action_assistant.web.http.refusals import answer, refuse
 from action_assistant.web.network.addresses import Addresses
 
 log: Final = logging.getLogger(__name__)
@@ -75,8 +75,6 @@ _HEADERS: Final = (
     (b"cross-origin-opener-policy", b"same-origin"),
 )
 _UNFRAMED: Final = (b"x-frame-options", b"DENY")
-#: Of a refused upgrade: who gets the same refusal without it is behind a proxy that passes none on.
-REFUSED_SOCKET: Final = (b"x-refused", b"websocket")
 
 
 def cookie_name(page_port: int) -> str:
@@ -238,7 +236,8 @@ class Access:
     the Content-Security-Policy for a page at this path under that Host header, and `is_framed(path)`
     whether other sites may show it in a frame. `tokens` knows the tokens of programs, `views` the
     links that show one thing; `is_of_link(path)` says which paths such a link may ask for: every
-    other one is refused. `standings`: knows what sessions and tokens are worth now; without it they are
+    other one is refused. `relay`: a middleware that sends some requests to other editors of this server;
+    None for a server with one. `standings`: knows what sessions and tokens are worth now; without it they are
     worth what they say themselves.
     """
 
@@ -258,8 +257,10 @@ class Access:
         tokens: Tokens | None = None,
         views: Views | None = None,
         standings: Standings | None = None,
+        relay: Callable[[ASGIApp], ASGIApp] | None = None,
     ) -> None:
         self._app = app
+        self._relaying = app if relay is None else relay(app)
         self._standings = standings
         self._scraped = scraped or ScrapeToken()
         self._tokens = tokens or NoTokens()
@@ -289,34 +290,64 @@ class Access:
         except Refused as refused:
             await refuse(scope, receive, send, refused)
             return
+        if preflight:
+            await answer(send, 204, [(b"cache-control", b"no-store")], b"")
+            return
         identity: Identity | None = scope["state"].get("identity")
         if identity is not None and identity.person is _SCRAPER:
             identity = None  # as nobody: there is nothing else to be found out
+        way = _Way.of(scope, headers)
+        del headers  # of a socket they would be kept for as long as it is open
+        await self._pass(self._relaying, scope, receive, send, identity, way)
+
+    async def relayed(
+        self,
+        scope: HTTPScope | WebSocketScope,
+        receive: Receive,
+        send: Send,
+        identity: Identity,
+    ) -> None:
+        """Pass on a request that another editor of this server has admitted for `identity`, and end it when
+        the session or token ends."""
+        state = scope.setdefault("state", {})
+        state |= {"plain": Plain(receive, send), "identity": identity, "device": identity.device}
+        credential = identity.session or identity.token
+        state |= {} if identity.session is None else {"session": identity.session}
+        if credential is not None:
+            state["is_expired"] = lambda: self._standing(credential).expired
+        way = _Way.of(scope, _headers(scope))
+        await self._pass(self._app, scope, receive, send, identity, way)
+
+    async def _pass(
+        self,
+        app: ASGIApp,
+        scope: HTTPScope | WebSocketScope,
+        receive: Receive,
+        send: Send,
+        identity: Identity | None,
+        way: "_Way",
+    ) -> None:
+        """Pass a request that was admitted on to `app`, with its client as the caller. `identity`: None for a
+        stranger, and for whoever looks by a link."""
         asked: Receive | None = None
         if scope["type"] == ScopeType.HTTP:
-            receive, asked = _after_body(
-                receive, has_body=headers.get("content-length", "0") != "0"
-            )
+            receive, asked = _after_body(receive, has_body=way.has_body)
         view: View | None = scope["state"].get("view")
         if identity is not None:
             scope["state"].get(KNOWN, _nobody)(identity.person.id)
             set_caller(_caller(identity, asked))
         else:  # who looks by a link waits for nobody but others with this link
             set_caller(None if view is None else Caller(f"view-{view.id}", asked))
-        if preflight:
-            await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
-            return
         credential = view if identity is None else identity.session or identity.token
-        lasts = _lasts(scope, headers)
-        del headers  # of a socket they would be kept for as long as it is open
-        if credential is None or not lasts:
-            await self._app(scope, receive, send)
+        if credential is None or not way.lasts:
+            await app(scope, receive, send)
         else:
-            await self._leashed(credential, scope, receive, send)
+            await self._leashed(credential, app, scope, receive, send)
 
     async def _leashed(
         self,
         credential: Credential,
+        app: ASGIApp,
         scope: HTTPScope | WebSocketScope,
         receive: Receive,
         send: Send,
@@ -337,7 +368,7 @@ class Access:
             credential, outlives=scope["path"] == _LIVE, follows_groups=is_stream
         ) as leash:
             try:
-                await self._app(scope, receive, sent)
+                await app(scope, receive, sent)
                 if not leash.is_cut:
                     return
                 await asyncio.sleep(0)  # the cancellation may still be on its way
@@ -546,6 +577,17 @@ class Access:
         return dressed
 
 
+class _Way(NamedTuple):
+    """The way that a request goes on: `lasts` as `_lasts` says, `has_body` if there is one to be read."""
+
+    lasts: bool
+    has_body: bool
+
+    @classmethod
+    def of(cls, scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> "_Way":
+        return cls(_lasts(scope, headers), headers.get("content-length", "0") != "0")
+
+
 def _after_body(receive: Receive, *, has_body: bool) -> tuple[Receive, Receive]:
     """Return two functions for the messages of one request: for its route, and for whoever waits
     until its client has disconnected. The latter takes nothing of the body, which a guard that works
@@ -569,15 +611,19 @@ def _after_body(receive: Receive, *, has_body: bool) -> tuple[Receive, Receive]:
 
 def _caller(identity: Identity, receive: Receive | None) -> Caller:
     """Return the client of a request, with the connection by which its person acts."""
+    return Caller(identity.person.id, receive, identity.device, origin_by(identity), identity)
+
+
+def origin_by(identity: Identity) -> Origin:
+    """Return the connection by which an identity acts, as events keep it."""
     session, token = identity.session, identity.token
     own = "server" if session is None else ""
-    origin = Origin(
+    return Origin(
         name=identity.person.name,
         session="" if session is None else session.id,
         token=own if token is None else token.id,
         address=identity.address,
     )
-    return Caller(identity.person.id, receive, identity.device, origin, identity)
 
 
 def client_address(scope: HTTPScope | WebSocketScope) -> str:
@@ -632,40 +678,6 @@ def _headers(scope: HTTPScope | WebSocketScope) -> dict[str, str]:
         joiner = "; " if name == "cookie" else ", "
         found[name] = f"{found[name]}{joiner}{text}" if name in found else text
     return found
-
-
-async def refuse(
-    scope: HTTPScope | WebSocketScope, receive: Receive, send: Send, refused: Refused
-) -> None:
-    """Answer a request, or the upgrade request of a WebSocket, with a refusal."""
-    log.info("refused %s: %s", scope["path"], refused.detail)
-    body = problem_of(refused)
-    fields = [(b"content-type", b"application/problem+json")]
-    if scope["type"] == ScopeType.WEBSOCKET:
-        fields.append(REFUSED_SOCKET)
-    if refused.status == 401:
-        fields.append((b"www-authenticate", b"Bearer"))
-    if refused.status == 429:
-        fields.append((b"retry-after", b"5"))
-    if scope["type"] == ScopeType.WEBSOCKET:
-        await receive()  # websocket.connect
-        await _answer(send, refused.status, fields, body, prefix="websocket.")
-    else:
-        await _answer(send, refused.status, fields, body)
-
-
-async def _answer(
-    send: Send, status: int, fields: list[tuple[bytes, bytes]], body: bytes, prefix: str = ""
-) -> None:
-    length = (b"content-length", str(len(body)).encode())
-    start: Any = {
-        "type": f"{prefix}http.response.start",
-        "status": status,
-        "headers": [*fields, length] if status != 204 else fields,
-    }
-    end: Any = {"type": f"{prefix}http.response.body", "body": body, "more_body": False}
-    await send(start)
-    await send(end)
 
 
 def _user_name() -> str:

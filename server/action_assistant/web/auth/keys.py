@@ -181,6 +181,11 @@ class Keys:
         end as bytes, which the secret seals."""
         return _text(hmac.digest(self._seal, b"view\0" + link, "sha256"))
 
+    @property
+    def relay_key(self) -> bytes:
+        """The key under which editors of one server seal what they relay to each other."""
+        return hmac.digest(self._seal, b"relay between editors", "sha256")
+
     def end_seal(self, session: str, person: str) -> str:
         """Return the seal by which a person ends one of their sessions at a process that does not
         know whose it is. It proves nothing else."""

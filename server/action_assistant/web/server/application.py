@@ -1,7 +1,7 @@
 """The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Annotated, Any, Final, NamedTuple
@@ -71,7 +71,8 @@ def application(
     more_runners: Sequence[int] = (),
     mount: str = "",
     body_limit: int = BODY_LIMIT,
-) -> ASGIApp:
+    relay: Callable[[ASGIApp], ASGIApp] | None = None,
+) -> "Application":
     """Return the whole ASGI application of a process. `title`: the title of its OpenAPI document;
     `keys`, `revoked`: how clients are authenticated; `addresses`, `page_port`: the hosts and
     origins that may call it; `lifespan`: contexts for as long as it runs. `body_limit`: bytes of a
@@ -80,7 +81,7 @@ def application(
     Content-Security-Policy; `more_runners`: the ports of further ones on this computer. `mount`: the path at which a proxy serves this process. `scraped`: the
     token that allows /metrics only. `tokens`: the tokens of programs; `views`: the links that show
     one thing, `frames`: the origins of sites that may show these in a frame. `standings`: knows
-    what sessions and tokens are worth now. Raise CannotStart if a route declares no right."""
+    what sessions and tokens are worth now. `relay`: as `Access` takes it. Raise CannotStart if a route declares no right."""
     handlers = [
         *route_handlers,
         *_health(monitoring),
@@ -99,7 +100,7 @@ def application(
         return str(state.get(MOUNT) or (public.path if public is not None else ""))
 
     built, is_public = _with_built(inner, page, help_site, root_of)
-    outer: ASGIApp = Access(
+    access = Access(
         built,
         keys=keys,
         addresses=addresses,
@@ -115,8 +116,10 @@ def application(
         tokens=tokens,
         views=views,
         standings=standings,
+        relay=relay,
     )
-    return _Described(Mounted(Requests(outer, _counts(monitoring)), mount), openapi)
+    outer = Mounted(Requests(access, _counts(monitoring)), mount)
+    return Application(outer, openapi, access)
 
 
 def _counts(monitoring: Monitoring | None) -> RequestCounts:
@@ -211,12 +214,19 @@ def _methods(route: BaseRoute) -> Iterator[tuple[str, BaseRouteHandler]]:
         yield "WEBSOCKET" if isinstance(route, WebSocketRoute) else "ASGI", route.route_handler
 
 
-class _Described:
-    """The application, with its OpenAPI document for programs that generate types from it."""
+class Application:
+    """The application of a process, with its OpenAPI document for programs that generate types from it.
+    `access`: its access control; `entrance`: what answers other editors of the server at a listener of
+    its own, None without one; `leave`: called when the process is told to end, before its connections
+    are closed."""
 
-    def __init__(self, outer: ASGIApp, openapi: OpenApiText) -> None:
+    entrance: ASGIApp | None = None
+    leave: Callable[[], Awaitable[None]] | None = None
+
+    def __init__(self, outer: ASGIApp, openapi: OpenApiText, access: Access) -> None:
         self._outer = outer
         self._openapi = openapi
+        self.access: Final = access
 
     def openapi(self) -> bytes:
         """Return the OpenAPI document as JSON. This is slow."""

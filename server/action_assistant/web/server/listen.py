@@ -8,7 +8,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, suppress
 from contextvars import ContextVar
 from types import FrameType
@@ -25,6 +25,7 @@ from action_assistant.public_url import Network
 from action_assistant.system import posix, service_manager
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.connections import Connections, has_unread
+from action_assistant.web.server.application import Application
 from action_assistant.web.server.direct import DirectSocket, WebSocketProtocol, end_connection
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
@@ -41,6 +42,7 @@ _CALLS: Final = frozenset({"http", "websocket"})
 _WITHOUT_BODY: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Processor time and time (seconds) when what is answered came in.
 _RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
+_LEAVE_S: Final = 8.0
 _FAILED: Final = 3  # exit code when the application could not be set up
 _BODY_S: Final = 30.0  # between two pieces of a body
 _ENDED_EARLY: Final = "The body ended early."
@@ -59,7 +61,7 @@ _GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger ge
 
 
 def serve(
-    make: Callable[[], ASGIApp],
+    make: Callable[[], Application],
     *,
     host: str,
     port: int,
@@ -67,29 +69,37 @@ def serve(
     proxies: tuple[Network, ...] = (),
     direct: bool = False,
     publish: Callable[[str], AbstractContextManager[None]] | None = None,
+    inside: tuple[str, int] | None = None,
 ) -> None:
     """Bind `host` and `port`, then make the application and serve it until the process is told to
     end or its parent dies. `identity`: serve TLS with its certificate. `proxies`: addresses whose
     forwarding headers are trusted. `direct`: let the application take over WebSockets, so that
     their binary messages reach it without the server's queues (`direct.py`). `publish`: called with
     the URL by which programs on this computer reach the process; its context is entered once the
-    application is set up, and left when it shuts down. Raise CannotStart if the address is taken or
+    application is set up, and left when it shuts down. `inside`: the host and port at which other editors of
+    the server reach the application's entrance. Raise CannotStart if an address is taken or
     unknown."""
-    sockets = bound(host, port)
+    sockets, inner = bound(host, port), []
     try:
+        inner = [] if inside is None else bound(*inside, option="--cluster-listen")
         if identity is not None:
             identity.certificate.renew(identity.names())
-        endings = StreamEndings(make())
+        application = make()
     except BaseException:
-        for listener in sockets:
+        for listener in [*sockets, *inner]:
             listener.close()
         raise
+    endings = StreamEndings(application)
     forwarded = Forwarded(endings, proxies)
     connections = Connections(posix.raise_descriptors(), forwarded.is_proxy)
     app = ActivityTracker(forwarded, connections)
     config = _configured(app, identity, direct=direct)
     logging.getLogger("uvicorn.error").addFilter(_shorten_error)
     server = _Server(config, endings, connections, publish)
+    if application.entrance is not None:
+        entrance = ActivityTracker(application.entrance, connections)
+        server.listen_inside(inner, _configured(entrance, None, direct=direct))
+    server.leave = application.leave
     _end_with_parent(server)
     server.run(sockets=sockets)
     if not server.started:
@@ -368,7 +378,15 @@ class _Server(uvicorn.Server):
         self._publish = publish
         self._published = ExitStack()
         self._ends: Final = asyncio.Event()
+        self._inside: list[socket.socket] = []
+        self._inner_config: uvicorn.Config | None = None
+        self.leave: Callable[[], Awaitable[None]] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
+
+    def listen_inside(self, sockets: list[socket.socket], config: uvicorn.Config) -> None:
+        """Serve the application of `config` at other sockets, too, from the startup on."""
+        config.load()
+        self._inside, self._inner_config = sockets, config
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Take up a signal that ends the server. Python calls this between two of its steps."""
@@ -402,6 +420,8 @@ class _Server(uvicorn.Server):
         self.servers = []
         for listener in sockets or []:
             self._connections.listen(listener, self._protocol, self.config.ssl)
+        for listener in self._inside:
+            self._connections.listen(listener, self._inner_protocol, None)
         self.started = True
         self._publish_address(sockets or [])
         service_manager.notify("READY=1")
@@ -426,16 +446,28 @@ class _Server(uvicorn.Server):
                 error.strerror,
             )
 
+    async def _left(self, leave: Callable[[], Awaitable[None]]) -> None:
+        try:
+            async with asyncio.timeout(_LEAVE_S):
+                await leave()
+        except Exception:  # it ends all the same
+            log.exception("not everything was left in order")
+
+    def _inner_protocol(self) -> asyncio.Protocol:
+        return _Http(config=self._inner_config, server_state=self.server_state, app_state={})
+
     def _protocol(self) -> asyncio.Protocol:
         return _Http(
             config=self.config, server_state=self.server_state, app_state=self.lifespan.state
         )
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Shut down: end streams, close the listeners, and wait for open requests. uvicorn calls
+        """Shut down: let the application leave what others can take over, end streams, close the listeners, and wait for open requests. uvicorn calls
         this once."""
         service_manager.notify("STOPPING=1")
         self._published.close()
+        if self.leave is not None:
+            await self._left(self.leave)
         self._endings.begin()
         self._connections.close()
         await super().shutdown(sockets)

@@ -10,10 +10,10 @@ from action_assistant.settings import EVERYWHERE
 UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it was sent is gone
 
 
-def bound(host: str, port: int) -> list[socket.socket]:
+def bound(host: str, port: int, option: str = "--port") -> list[socket.socket]:
     """Return listening sockets for the address: for a loopback name in both IP families, so that no
     other process can answer under `localhost`; for EVERYWHERE in both families, too. Raise
-    CannotStart if the address is taken or unknown."""
+    CannotStart if the address is taken or unknown; it names the `option` that chooses it."""
     hosts = [host]
     if host in {"127.0.0.1", "localhost"}:
         hosts = ["127.0.0.1", "::1"]
@@ -39,7 +39,7 @@ def bound(host: str, port: int) -> list[socket.socket]:
                 continue  # IPv6 is known to the kernel but switched off
             for other in found:
                 other.close()
-            raise CannotStart(_why(name, port, error)) from error
+            raise CannotStart(_why(name, port, error, option)) from error
         found.append(listener)
     return found
 
@@ -55,7 +55,7 @@ def _forget_silent_peers(listener: socket.socket) -> None:
             listener.setsockopt(socket.IPPROTO_TCP, number, value)
 
 
-def _why(host: str, port: int, error: OSError) -> str:
+def _why(host: str, port: int, error: OSError, option: str) -> str:
     if error.errno == errno.EADDRINUSE:
-        return f"Port {port} is taken on {host}; choose another with --port."
+        return f"Port {port} is taken on {host}; choose another with {option}."
     return f"Cannot listen on {host}, port {port}: {error.strerror}."

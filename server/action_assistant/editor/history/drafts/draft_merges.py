@@ -131,7 +131,7 @@ class DraftMerges:
             _require_choices(found.left)
             return pair, merge, found
 
-        async with self._rooms.enter(h.graph_stream(target)) as room:
+        async with self._rooms.reach(h.graph_stream(target)) as room:
             edit = await store(room, author, compute, lambda computed: computed[2].update)
         pair, merge, found = edit.computed
         if edit.changed or found.any_conflicts:

@@ -1,0 +1,91 @@
+"""A room that another editor has open, for edits of the server itself."""
+
+from collections.abc import Awaitable, Callable
+from typing import Final, TypeAlias
+from urllib.parse import quote, urlencode
+
+import httpx
+import msgspec
+
+from action_assistant.editor.cluster.peers import Call, Peers
+from action_assistant.editor.rooms.batch import DocumentState
+from action_assistant.editor.rooms.room import Room
+from action_assistant.errors import OutcomeUnknown, Refused, Unavailable, refused_elsewhere
+
+#: The path of rooms at the listener for other editors.
+ROOMS: Final = "/rooms/"
+SEQ: Final = "x-seq"
+_MOVED: Final = "This graph has just moved to another editor; try again."
+_UNREADABLE: Final = "The editor that has this graph open gave an answer that cannot be read."
+
+
+class SubmittedSeq(msgspec.Struct, frozen=True):
+    """The answer to an edit that was submitted to a room."""
+
+    seq: int
+
+
+#: A room wherever it is open, for edits of the server itself.
+AnyRoom: TypeAlias = "Room | RemoteRoom"
+
+
+class _Problem(msgspec.Struct, frozen=True):
+    """The part of problem details by which a refusal is raised again."""
+
+    type: str
+    detail: str
+    where: dict[str, object] | None = None
+
+
+class RemoteRoom:
+    """The room of a stream at the editor that owns it, with what edits of the server need of a room."""
+
+    def __init__(self, stream: str, peers: Peers) -> None:
+        self._target = ROOMS + quote(stream, safe="")
+        self._stream = stream
+        self._peers = peers
+        #: The number of the last change, as far as it was heard of here.
+        self.seq = 0
+
+    async def submit(self, update: bytes, author: str, expected: int | None = None) -> int:
+        """Do what `Room.submit` does. Raise OutcomeUnknown, too, if the answer was lost."""
+        query = {"author": author} | ({} if expected is None else {"expected": str(expected)})
+        call = Call("POST", f"{self._target}?{urlencode(query)}", (), update)
+        _, body = await self._ask(call)
+        self.seq = msgspec.json.decode(body, type=SubmittedSeq).seq
+        return self.seq
+
+    async def submit_in_turn(
+        self, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
+    ) -> int:
+        """Do what `Room.submit_in_turn` does, but let no edits wait: whoever is faster overtakes this one.
+        Raise OutcomeUnknown, too, if the answer was lost."""
+        seq, state = await self.now()
+        return await self.submit(await compute(state, seq), author, seq)
+
+    async def now(self) -> DocumentState:
+        """Return the document and the number of its last change, as `Room.now` does."""
+        headers, state = await self._ask(Call("GET", self._target))
+        self.seq = int(headers[SEQ])
+        return DocumentState(self.seq, state)
+
+    async def _ask(self, call: Call) -> tuple[httpx.Headers, bytes]:
+        """Return the header fields and the body of an answer. Raise the refusal of the other editor."""
+        async with self._peers.answer(self._stream, call) as answer:
+            if answer is None:
+                raise Unavailable(_MOVED)
+            try:
+                body = await answer.aread()
+            except httpx.HTTPError as error:
+                raise OutcomeUnknown(_UNREADABLE) from error
+            if not answer.is_success:
+                raise _refusal(body)
+            return answer.headers, body
+
+
+def _refusal(body: bytes) -> Refused:
+    try:
+        problem = msgspec.json.decode(body, type=_Problem)
+    except msgspec.DecodeError:
+        return Unavailable(_UNREADABLE)
+    return refused_elsewhere(problem.type, problem.detail, problem.where)

@@ -1,0 +1,176 @@
+"""The entrance takes what another editor of the server has sealed, once, and nothing else."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import httpx
+import pytest
+
+from action_assistant.editor.cluster.owners import Elsewhere, Owner
+from action_assistant.editor.cluster.peers import Peers
+from action_assistant.editor.cluster.relay_seal import RelayedFacts, RelaySeal
+from action_assistant.editor.rooms.remote_room import RemoteRoom
+from action_assistant.errors import Overtaken, Unavailable
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import Keys, Person
+from editor.client import updates
+from editor.cluster.conftest import Pair
+from support.product import TOKEN
+
+SEAL = RelaySeal(Keys(TOKEN).relay_key)
+OWNER = RelayedFacts(Identity(Person("ann", "Ann", "owner")), "192.0.2.7", "request-1")
+VIEWER = RelayedFacts(Identity(Person("vic", "Vic", "viewer")), "192.0.2.8", "request-2")
+
+
+@pytest.fixture
+def inside(pair: Pair) -> Iterator[httpx.Client]:
+    """A program on the private network."""
+    with httpx.Client(base_url=pair.there.inner, trust_env=False) as client:
+        yield client
+
+
+def sealed(
+    method: str, path: str, body: bytes = b"", facts: RelayedFacts = OWNER, seal: RelaySeal = SEAL
+) -> dict[str, str]:
+    """Return the header fields of another editor."""
+    return dict(seal.headers(method, path, body, facts))
+
+
+def test_a_sealed_request_is_answered_for_the_person_that_it_names(
+    pair: Pair, inside: httpx.Client
+) -> None:
+    path = f"/internal/api/graphs/{pair.new_graph()}"
+    body = b'{"name": "new"}'
+    json = {"content-type": "application/json"}
+    found = inside.patch(path, content=body, headers={**json, **sealed("PATCH", path, body)})
+    assert (found.status_code, found.json()["name"]) == (200, "new")
+    refused = inside.patch(
+        path, content=body, headers={**json, **sealed("PATCH", path, body, VIEWER)}
+    )
+    assert (refused.status_code, refused.json()["type"]) == (403, "forbidden")
+
+
+def test_a_seal_is_good_once_for_one_request(pair: Pair, inside: httpx.Client) -> None:
+    path, other = (f"/internal/api/graphs/{pair.new_graph()}" for _ in range(2))
+    good = sealed("GET", path)
+    assert inside.get(path, headers=good).status_code == 200
+    wrong = {
+        "once more": inside.get(path, headers=good),
+        "another path": inside.get(other, headers=sealed("GET", path)),
+        "a query": inside.get(f"{path}?a=b", headers=sealed("GET", path)),
+        "another method": inside.delete(path, headers=sealed("GET", path)),
+        "another body": inside.put(
+            f"{path}/umrf", content=b"{}", headers=sealed("PUT", f"{path}/umrf")
+        ),
+        "another person": inside.get(
+            path,
+            headers=sealed("GET", path, facts=VIEWER)
+            | {"x-relayed": sealed("GET", path)["x-relayed"]},
+        ),
+        "no seal": inside.get(path),
+        "the token": inside.get(path, headers={"authorization": f"Bearer {TOKEN}"}),
+        "another token": inside.get(
+            path, headers=sealed("GET", path, seal=RelaySeal(Keys("k" * 43).relay_key))
+        ),
+        "early": inside.get(
+            path, headers=sealed("GET", path, seal=RelaySeal(Keys(TOKEN).relay_key, ago(60)))
+        ),
+        "late": inside.get(
+            path, headers=sealed("GET", path, seal=RelaySeal(Keys(TOKEN).relay_key, ago(-60)))
+        ),
+        "nobody": inside.get(path, headers=sealed("GET", path, facts=RelayedFacts())),
+        "no time": inside.get(path, headers=good | {"authorization": "Relay //"}),
+        "nonsense": inside.get(
+            path, headers=good | {"authorization": "Relay \xe4".encode("latin-1")}
+        ),
+    }
+    assert {
+        why: (each.status_code, each.headers.get("www-authenticate")) for why, each in wrong.items()
+    } == dict.fromkeys(wrong, (401, "Relay"))
+    assert all(each.json()["type"] == "unauthenticated" for each in wrong.values())
+    assert inside.get(path, headers=sealed("GET", path)).status_code == 200
+
+
+def ago(seconds: float) -> Callable[[], float]:
+    return lambda: time.time() - seconds
+
+
+def test_what_this_editor_does_not_own_is_refused_and_never_passed_on(
+    pair: Pair, inside: httpx.Client
+) -> None:
+    graph = pair.new_graph()
+    pair.give(f"graph/{graph}", pair.here)
+    for path in (f"/internal/api/graphs/{graph}", f"/internal/rooms/graph%2F{graph}"):
+        assert inside.get(path, headers=sealed("GET", path)).status_code == 421
+    for path in ("/internal/api/people", "/internal/api/graphs", "/api/graphs/x", "/internal/"):
+        assert inside.get(path, headers=sealed("GET", path)).status_code == 404
+
+
+def test_the_public_port_knows_no_seals(pair: Pair) -> None:
+    graph = pair.new_graph()
+    with httpx.Client(base_url=pair.there.url, trust_env=False) as stranger:
+        for path in (f"/internal/api/graphs/{graph}", f"/api/graphs/{graph}"):
+            assert stranger.get(path, headers=sealed("GET", path)).status_code == 401
+    with pair.there.client() as person:
+        path = f"/internal/api/graphs/{graph}"
+        assert (
+            person.get(path, headers={"x-relayed": sealed("GET", path)["x-relayed"]}).status_code
+            == 404
+        )
+    for editor in (
+        pair.here,
+        pair.there,
+    ):  # whoever says that they are somebody else stays who they are
+        with editor.client() as person:
+            claimed = {
+                name: value
+                for name, value in sealed("GET", "/x").items()
+                if name != "authorization"
+            }
+            made = person.post(f"/api/graphs/{graph}/versions", json={}, headers=claimed)
+            assert made.json()["author"]["id"] == "local"
+
+
+class Here:
+    """Owners of an editor that owns nothing."""
+
+    draining = False
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+
+    async def owner(self, stream: str) -> Owner:
+        """Return the other editor."""
+        del stream
+        return Elsewhere(self._url, 1)
+
+    async def give_up(self, stream: str) -> None:
+        """Do nothing."""
+
+    async def drain(self) -> None:
+        """Do nothing."""
+
+    def when_lost(self, hear: Callable[[str], object]) -> None:
+        """Do nothing."""
+
+
+async def test_a_remote_room_takes_edits_of_the_server_as_the_room_would(pair: Pair) -> None:
+    graph = pair.new_graph()
+    peers = Peers(Here(pair.there.inner), SEAL)
+    room = RemoteRoom(f"graph/{graph}", peers)
+    before, _ = await room.now()
+    one, two = updates(("a", "1"), ("b", "2"))
+    assert await room.submit(one, "ann", before) == before + 1
+    assert await room.submit(one, "ann", before + 1) == before + 1  # it changed nothing
+    with pytest.raises(Overtaken):
+        await room.submit(two, "ann", before)
+    assert await room.submit(two, "ann") == before + 2
+    seq, state = await room.now()
+    assert (seq, b"things" in state) == (before + 2, True)
+    with pair.there.client() as there:
+        changes = there.get(f"/api/graphs/{graph}/history").json()
+        assert changes
+    pair.give(f"graph/{graph}", pair.here)
+    with pytest.raises(Unavailable):
+        await room.now()
+    await peers.aclose()

@@ -1,0 +1,330 @@
+"""Several editors of one Postgres are one server to whoever uses them."""
+
+import asyncio
+import contextlib
+import os
+import random
+import signal
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from pycrdt import (
+    Doc,
+    Map,
+    YMessageType,
+    create_sync_message,
+    create_update_message,
+    handle_sync_message,
+)
+
+from action_assistant.journal.events import nothing
+from action_assistant.journal.journal import Journal
+from editor.cluster.several import OneOfSeveral, several
+from editor.cluster.test_relay import closed, until
+from journal.servers import Server
+
+FROZEN_S = float(os.environ.get("SOAK_FROZEN_S", "8"))
+
+
+@pytest.fixture(scope="module")
+def editors(tmp_path_factory: pytest.TempPathFactory, postgres: Server) -> Any:
+    """Three editors that tests share."""
+    folder = tmp_path_factory.mktemp("several")
+    with several(folder, postgres.new_database(), 3) as found:
+        yield found
+
+
+def asked(editor: OneOfSeveral, method: str, path: str, **more: Any) -> Any:
+    with editor.client() as client:
+        answer = client.request(method, path, **more)
+    assert answer.is_success, answer.text
+    return answer.json() if answer.content else None
+
+
+async def test_people_at_all_editors_are_in_one_room(editors: list[OneOfSeveral]) -> None:
+    graph = asked(editors[0], "POST", "/api/graphs", json={"name": "task"})["id"]
+    docs = [Doc[Any]() for _ in editors]
+    async with (
+        editors[0].joined(graph, docs[0]),
+        editors[1].joined(graph, docs[1]),
+        editors[2].joined(graph, docs[2]),
+    ):
+        for n in range(40):
+            for which, doc in enumerate(docs):
+                doc.get("meta", type=Map)[f"{which}-{n}"] = float(n)
+        await until(lambda: all(len(doc.get("meta", type=Map)) >= 120 for doc in docs))
+    assert len({asked(each, "GET", f"/api/graphs/{graph}")["seq"] for each in editors}) == 1
+
+
+async def test_graphs_and_people_of_one_editor_are_known_at_all(
+    editors: list[OneOfSeveral],
+) -> None:
+    one, two, three = editors
+    graph = asked(one, "POST", "/api/graphs", json={"name": "somewhere"})["id"]
+    assert graph in [each["id"] for each in asked(two, "GET", "/api/graphs")]
+    asked(three, "PATCH", f"/api/graphs/{graph}", json={"name": "elsewhere"})
+    assert "elsewhere" in [each["name"] for each in asked(two, "GET", "/api/graphs")]
+    asked(one, "POST", "/api/members", json={"name": "Mari", "role": "editor"})
+    link = asked(two, "POST", "/api/invitations", json={"role": "viewer", "label": "tour"})
+    await until(lambda: "Mari" in str(asked(three, "GET", "/api/members")))
+    await until(lambda: link["id"] in str(asked(three, "GET", "/api/invitations")))
+    asked(two, "DELETE", f"/api/graphs/{graph}")
+    with one.client() as client:
+        assert client.get(f"/api/graphs/{graph}").status_code == 404
+    assert graph not in [each["id"] for each in asked(three, "GET", "/api/graphs")]
+
+
+async def test_a_rule_that_is_set_at_one_editor_holds_at_all(editors: list[OneOfSeveral]) -> None:
+    one, two, three = editors
+    folder = asked(one, "POST", "/api/folders", json={"name": "secret"})["id"]
+    graph = asked(two, "POST", "/api/graphs", json={"name": "hidden"})["id"]
+    asked(one, "PUT", f"/api/graphs/{graph}/folder", json={"folder": folder})
+    link = asked(three, "POST", "/api/invitations", json={"role": "viewer", "label": ""})
+    async with httpx.AsyncClient(base_url=three.url, trust_env=False) as guest:
+        origin = {"origin": three.url}
+        await until(lambda: link["id"] in str(asked(three, "GET", "/api/invitations")))
+        proof = {"invitation": link["path"].partition("=")[2], "name": "Gus"}
+        assert (await guest.post("/api/session", json=proof, headers=origin)).is_success
+        assert (await guest.get(f"/api/graphs/{graph}")).status_code == 200
+        cookie = "; ".join(f"{name}={value}" for name, value in guest.cookies.items())
+        async with three.socket(graph, cookie=cookie, **origin) as socket:
+            rule = {"rule": {"readers": [], "editors": []}}
+            asked(one, "PUT", f"/api/folders/{folder}/rule", json=rule)
+            assert await closed(socket) == 4404
+        assert (await guest.get(f"/api/graphs/{graph}")).status_code == 404
+        await until(lambda: link["id"] in str(asked(one, "GET", "/api/invitations")))
+        asked(one, "POST", f"/api/invitations/{link['id']}/revoke")
+        assert (await guest.get("/api/graphs")).status_code == 401
+
+
+async def test_a_personal_link_lets_one_browser_in_at_whichever_editor(
+    editors: list[OneOfSeveral],
+) -> None:
+    for n in range(3):
+        made = asked(
+            editors[n], "POST", "/api/members", json={"name": f"Mari {n}", "role": "editor"}
+        )
+        proof = made["links"][0]["path"].partition("=")[2]
+        await until(
+            lambda made=made: all(
+                made["id"] in str(asked(each, "GET", "/api/members")) for each in editors
+            )
+        )
+
+        def come(editor: OneOfSeveral, proof: str = proof) -> int:
+            body = {"invitation": proof, "name": "Mari"}
+            with httpx.Client(base_url=editor.url, trust_env=False) as browser:
+                return browser.post(
+                    "/api/session", json=body, headers={"origin": editor.url}
+                ).status_code
+
+        came = await asyncio.gather(
+            *(asyncio.to_thread(come, each) for each in editors for _ in range(2))
+        )
+        assert len([status for status in came if status < 300]) == 1, came
+
+
+def test_an_action_of_the_library_is_changed_in_graphs_that_other_editors_have_open(
+    editors: list[OneOfSeveral],
+) -> None:
+    one, two, three = editors
+    action = asked(one, "POST", "/api/actions", json={"name": "Grip"})["id"]
+    graph = asked(two, "POST", "/api/graphs", json={"name": "uses it"})["id"]
+    seq = asked(two, "GET", f"/api/graphs/{graph}")["seq"]
+    asked(two, "PATCH", f"/api/graphs/{graph}", json={"description": "open there"})
+    renamed = asked(three, "POST", f"/api/graphs/{graph}/restore", json={"seq": seq})
+    assert renamed["seq"] == seq + 2
+    draft = asked(one, "POST", f"/api/graphs/{graph}/drafts", json={"name": "try"})["id"]
+    asked(three, "PATCH", f"/api/graphs/{draft}", json={"description": "of the draft"})
+    sides = asked(two, "POST", f"/api/drafts/{draft}/preview", json={})
+    merged = asked(
+        one,
+        "POST",
+        f"/api/drafts/{draft}/merge",
+        json={"seq": sides["seq"], "draft_seq": sides["draft_seq"]},
+    )
+    assert merged["changed"]
+    for each in editors:
+        assert asked(each, "GET", f"/api/graphs/{graph}")["description"] == "of the draft"
+        assert asked(each, "GET", f"/api/actions/{action}/umrf")
+        assert asked(each, "GET", f"/api/graphs/{graph}/history")
+
+
+class Stubborn:
+    """A stock client that connects again to its editor, or to the next one, whatever happens, and counts what
+    it wrote."""
+
+    def __init__(self, name: str, editors: list[OneOfSeveral], first: int, graph: str) -> None:
+        self.doc = Doc[Any]()
+        self.written: set[str] = set()
+        self._name = name
+        self._editors = editors
+        self._at = first
+        self._graph = graph
+        self._things = self.doc.get("meta", type=Map)
+        self._task = asyncio.create_task(self._stay_connected())
+
+    def write(self) -> None:
+        """Write something under a key of its own."""
+        key = f"x/{self._name}-{len(self.written)}"
+        self.written.add(key)
+        self._things[key] = float(len(self.written))
+
+    def has(self, keys: set[str]) -> bool:
+        """Return whether it has all of these keys."""
+        return keys <= set(self._things)
+
+    async def _stay_connected(self) -> None:
+        while True:
+            editor = self._editors[self._at % len(self._editors)]
+            with contextlib.suppress(Exception):
+                async with (
+                    asyncio.timeout(_GIVE_UP_S),
+                    editor.socket(self._graph) as session,
+                ):
+                    await self._serve(session)
+            self._at += 1
+            await asyncio.sleep(0.3)
+
+    async def _serve(self, session: Any) -> None:
+        """Speak the protocol of stock clients until the socket ends, or is silent for too long."""
+        sent: list[bytes] = []
+        news = asyncio.Event()
+
+        def hear(event: Any) -> None:
+            sent.append(event.update)
+            news.set()
+
+        async def tell() -> None:
+            while True:
+                await news.wait()
+                news.clear()
+                while sent:
+                    await session.send_bytes(create_update_message(sent.pop(0)))
+
+        subscription = self.doc.observe(hear)
+        telling = asyncio.create_task(tell())
+        try:
+            await session.send_bytes(create_sync_message(self.doc))
+            while not telling.done():
+                message = await session.receive_bytes(timeout=_SILENT_S)
+                if message[0] == YMessageType.SYNC:
+                    answer = handle_sync_message(message[1:], self.doc)
+                    if answer is not None:
+                        await session.send_bytes(answer)
+        finally:
+            self.doc.unobserve(subscription)
+            telling.cancel()
+
+    async def aclose(self) -> None:
+        """Leave for good."""
+        self._task.cancel()
+        await asyncio.wait([self._task])
+
+
+#: Stock clients give a silent server up after 30 s; so do these, but sooner.
+_SILENT_S = 12.0
+_GIVE_UP_S = 3600.0
+
+
+async def lived_through(
+    editors: list[OneOfSeveral], fault: Callable[[], Awaitable[None]], database: str
+) -> None:
+    """Let people at all editors write into three graphs before, during and after a fault, and check that
+    everybody has everything, once, and that each room is what its log says."""
+    graphs = [
+        asked(each, "POST", "/api/graphs", json={"name": f"g{n}"})["id"]
+        for n, each in enumerate(editors)
+    ]
+    people = {
+        graph: [Stubborn(f"{at}", editors, at, graph) for at in range(len(editors))]
+        for graph in graphs
+    }
+    everybody = [each for some in people.values() for each in some]
+
+    async def write(seconds: float) -> None:
+        until_then = asyncio.get_running_loop().time() + seconds
+        while asyncio.get_running_loop().time() < until_then:
+            random.choice(everybody).write()
+            await asyncio.sleep(0.03)
+
+    await write(2)
+    writing = asyncio.create_task(write(8))
+    await fault()
+    await writing
+    await write(2)
+    try:
+        for graph, some in people.items():
+            keys = set().union(*(each.written for each in some))
+            await until(lambda some=some, keys=keys: all(each.has(keys) for each in some), 90)
+            contents = [dict(each.doc.get("meta", type=Map)) for each in some]
+            assert contents[0] == contents[1] == contents[2]
+            assert await replayed(database, graph) == contents[0]
+    finally:
+        for each in everybody:
+            await each.aclose()
+    journal = await Journal.open(database, branch="editor", fold=nothing, several=True)
+    try:
+        assert await journal.verify() == []
+    finally:
+        await journal.close()
+
+
+async def replayed(database: str, graph: str) -> dict[str, Any]:
+    """Return what the log says of a graph, each of whose updates has to be in it once."""
+    journal = await Journal.open(database, branch="editor", fold=nothing, several=True)
+    try:
+        doc = Doc[Any]()
+        seen: list[bytes] = []
+        after = 0
+        while page := await journal.read(f"graph/{graph}", after=after):
+            after = page[-1].seq
+            seen += [each.body for each in page]
+        for body in seen:
+            doc.apply_update(body)
+        assert len(seen) == len(set(seen))
+        return dict(doc.get("meta", type=Map))
+    finally:
+        await journal.close()
+
+
+@pytest.mark.parametrize("fault", ["killed", "frozen", "ended"])
+async def test_nothing_is_lost_or_doubled_when_an_editor_is(
+    fault: str, tmp_path: Path, postgres: Server
+) -> None:
+    database = postgres.new_database()
+    with several(tmp_path, database, 3) as editors:
+
+        async def happen() -> None:
+            victim = editors[0]
+            match fault:
+                case "killed":
+                    victim.kill()
+                    await asyncio.sleep(2)
+                    victim.begin()
+                    await asyncio.to_thread(victim.wait)
+                case "frozen":
+                    victim.send(signal.SIGSTOP)
+                    await asyncio.sleep(FROZEN_S)
+                    victim.send(signal.SIGCONT)
+                case _:
+                    assert await asyncio.to_thread(victim.end) in {0, -signal.SIGTERM}
+                    victim.begin()
+                    await asyncio.to_thread(victim.wait)
+
+        await lived_through(editors, happen, database)
+
+
+def test_an_editor_with_another_token_is_refused(
+    editors: list[OneOfSeveral], tmp_path: Path
+) -> None:
+    stranger = OneOfSeveral(tmp_path / "data", editors[0].database, 9)
+    stranger.begin(ACTION_ASSISTANT_TOKEN="another-token-" + "0123456789abcdef" * 2)
+    assert stranger.child.wait(60) != 0
+    assert (
+        "has another token. All editors of one database need the same token"
+        in stranger.log.read_text()
+    )
