@@ -9,6 +9,7 @@ import {
   noticeKey,
   noticeOf,
   othersNotice,
+  runnerNotice,
   unreachableNotice,
 } from "./stop-notice";
 
@@ -225,4 +226,47 @@ test("a runner that is not reached is never silence", () => {
     unreached: { kind: "mute", why: "No socket opens." },
   } as const;
   expect(unreachableNotice(mute, 60_000)?.text).toContain("CANNOT BE PROVEN");
+});
+
+const NONE: ReadonlySet<string> = new Set();
+
+/** Two runs, of which the second one was stopped, and these Stops. */
+function withStops(...stops: StopRequest[]): LiveState {
+  const { runs, ...state } = now({ state: "running", group: "both" });
+  const ended = { state: "stopped", ended_at: "1970-01-01T00:00:02Z" };
+  const second = { ...runs.get("r"), id: "q", number: 8, engine: "Carol", ...ended } as Run;
+  return { ...state, stops, runs: new Map(runs).set("q", second) };
+}
+
+const unsent: StopRequest = { ...stop, id: "u", state: "unheard", detail: "A fault." };
+const proven: StopRequest = { ...stop, id: "p", run: "q", at: 1500, provenAt: 2000 };
+
+test("a Stop that was not sent stays in sight beside a later one that is proven, and says its run", () => {
+  for (const dismissed of [NONE, new Set(["u"])]) {
+    const notice = runnerNotice(withStops(unsent, proven), dismissed, 2500);
+    expect(notice).toMatchObject({ tone: "loud", stays: true });
+    expect(notice?.text).toMatch(/^NOT SENT: .*run 7 on David\. Run 8: stopped\.$/);
+    expect(runnerNotice(withStops(unsent, proven), dismissed, 60_000)?.text).toMatch(/^NOT SENT/);
+  }
+  const refused: StopRequest = { ...unsent, state: "refused" };
+  expect(runnerNotice(withStops(refused, proven), NONE, 60_000)?.text).toMatch(/^Stop refused/);
+  expect(runnerNotice(withStops(refused, proven), new Set(["u"]), 60_000)).toBeNull();
+});
+
+test("a Stop that is unconfirmed stays in sight beside a later one that is proven", () => {
+  const notice = runnerNotice(withStops(stop, proven), NONE, 5000);
+  expect(notice?.text).toMatch(/^STOP UNCONFIRMED: run 7 .* Run 8: stopped\.$/);
+  const two = runnerNotice(withStops(stop, { ...unsent, run: "q", at: 1500 }), NONE, 5000);
+  expect(two && headOf(two)).toBe("NOT SENT · STOP UNCONFIRMED");
+});
+
+test("a later Stop of the same run, of its group or of everything takes the place of an earlier one", () => {
+  for (const run of ["r", "both", "all"]) {
+    const later: StopRequest = { ...stop, id: "l", run, at: 1500, runs: ["r"] };
+    const said = runnerNotice(withStops(unsent, later), NONE, 2500);
+    expect(said).toMatchObject({ tone: "quiet", text: "Stopping run 7 …" });
+  }
+  const all: StopRequest = { ...unsent, run: "all", runs: ["r"] };
+  const said = runnerNotice(withStops(all, { ...stop, at: 1500 }), NONE, 2500);
+  expect(said?.text).toMatch(/^NOT SENT: .* Stopping run 7 …$/);
 });

@@ -230,13 +230,65 @@ export function withOwnStops(now: LiveState, sites: readonly SiteState[]): LiveS
   return { ...now, stops: now.stops.filter((stop) => !isElsewhere(stop)) };
 }
 
-/** Return the notice of one runner. `dismissed`: the ids of the Stops of which nobody wants to hear more. */
-function runnerNotice(now: LiveState, dismissed: ReadonlySet<string>, at: number): StopNoticeText {
-  const last = now.stops.at(-1);
-  const watching = last !== undefined && !dismissed.has(last.id);
+/**
+ * Return the Stops of which a notice tells, the newest first: the last one, and each earlier one that is not
+ * dealt with. `dismissed`: the ids of the Stops of which nobody wants to hear more, unless they could not be sent.
+ */
+export function toldStops(now: LiveState, dismissed: ReadonlySet<string>): StopRequest[] {
+  const isDue = (stop: StopRequest, i: number) =>
+    i === now.stops.length - 1 ||
+    stop.state !== "heard" ||
+    stopTargets(stop, now).some((run) => !isAtRest(run));
+  return now.stops
+    .filter((stop, i) => isDue(stop, i) && !isCovered(stop, now.stops.slice(i + 1), now))
+    .filter(({ id, state }) => state === "unheard" || !dismissed.has(id))
+    .reverse();
+}
+
+/** Return whether one of the later Stops means all that a Stop is about. */
+function isCovered(stop: StopRequest, later: readonly StopRequest[], now: LiveState): boolean {
+  const runs = stopTargets(stop, now);
+  const means = ({ run }: StopRequest) =>
+    run === "all" ||
+    run === stop.run ||
+    (runs.length > 0 && runs.every((each) => each.group === run));
+  return later.some(means);
+}
+
+/** Return one notice of several Stops, the worst first: none hides another one. */
+function noticeOfStops(stops: readonly StopRequest[], now: LiveState, at: number): StopNoticeText {
+  const found = stops.map((stop) => ({ stop, notice: noticeOf(stop, now, at) }));
+  const worst = TONES.flatMap((tone) => found.filter(({ notice }) => notice?.tone === tone));
+  const first = worst[0]?.notice ?? null;
+  if (first === null || worst.length === 1) return first;
+  const textsOf = (parts: typeof worst) => [
+    ...new Set(parts.map(({ stop, notice }) => textOf(stop, notice?.text ?? "", now))),
+  ];
+  const loud = textsOf(worst.filter(({ notice }) => notice?.tone === "loud"));
+  return {
+    ...first,
+    text: textsOf(worst).join(" "),
+    ...(worst.some(({ notice }) => notice?.stays) && { stays: true }),
+    ...(loud.length > 1 && { loud: loud.map((text) => ({ text })) }),
+  };
+}
+
+/** A Stop that was not taken says by itself not which one it is. */
+function textOf(stop: StopRequest, text: string, now: LiveState): string {
+  if (stop.state === "heard" || stop.run === "all") return text;
+  const runs = stopTargets(stop, now).map((run) => `run ${run.number} on ${engineWords(run)}`);
+  return runs.length === 0 ? text : `${text} This is about ${runs.join(", ")}.`;
+}
+
+/** Return the notice of one runner. `dismissed`: as for `toldStops`. */
+export function runnerNotice(
+  now: LiveState,
+  dismissed: ReadonlySet<string>,
+  at: number,
+): StopNoticeText {
   return (
     movingAgain(now) ??
-    (watching ? noticeOf(last, now, at) : null) ??
+    noticeOfStops(toldStops(now, dismissed), now, at) ??
     othersNotice(now) ??
     unreachableNotice(now, at)
   );
@@ -366,11 +418,10 @@ export function StopNotice() {
   const watching = last !== undefined && !dismissed.has(last.id);
   const open = openRuns(now).length;
   const states = now.sites?.map(({ state }) => state) ?? [now];
-  const lasts = states.flatMap(({ stops }) => stops.at(-1) ?? []);
-  const busy = lasts.some(
+  const told = states.flatMap((state) => toldStops(state, dismissed));
+  const busy = told.some(
     (each) =>
-      !dismissed.has(each.id) &&
-      (open > 0 || each.state !== "heard" || tick() - (each.provenAt ?? each.at) < GONE + 1000),
+      open > 0 || each.state !== "heard" || tick() - (each.provenAt ?? each.at) < GONE + 1000,
   );
   const at = useTick(200, busy || states.some(({ link }) => link !== "live"));
   const notice =
@@ -411,7 +462,10 @@ export function StopNotice() {
   const byRobot = runsByRobot(now, watching ? last : undefined);
   const hide = notice.stays
     ? { label: "Put aside", run: aside.put }
-    : { label: "Hide", run: () => setDismissed(new Set(lasts.map(({ id }) => id))) };
+    : {
+        label: "Hide",
+        run: () => setDismissed(new Set([...dismissed, ...told.map(({ id }) => id)])),
+      };
   return (
     <div
       ref={element}
