@@ -152,6 +152,13 @@ test("each engine is looked at by its own site, in the order that was asked for"
   expect(looks.map(({ engine }) => engine)).toEqual(["Dora", "Carl"]);
 });
 
+test("others are asked for their yes by the site of the robots, which has looked at the order", async () => {
+  answers = { POST: { receivers: 1 } };
+  const body = { digest: "d", robots: ["Dora"], graph_name: "g", version: "v" };
+  await runner.post("/api/approvals/asked", { body: body as never });
+  expect(asked).toEqual(["POST 8011/api/approvals/asked"]);
+});
+
 test("Stop of a robot goes to each site that may have it", async () => {
   answers = { POST: {} };
   const stop = (name: string) => runner.post("/api/robots/{name}/stop", { path: { name } });

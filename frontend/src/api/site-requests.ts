@@ -50,6 +50,7 @@ const OF_ROBOTS = new Set([
   "post /api/repeats",
   "post /api/preflight",
   "post /api/confirmations",
+  "post /api/approvals/asked", // the runner that looked at the order knows it in words
 ]);
 
 /** Send a request to the site or sites that it is meant for. */

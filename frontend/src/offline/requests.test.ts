@@ -61,6 +61,9 @@ test("what another runner serves below the public address is no page of it", () 
       { method: "GET", mode: "navigate", url: `https://x/temoto/${path}` },
       "https://x/temoto/",
     );
-  expect(at("hall-b/api/runs/a/export?format=jsonl")).toBe("pass");
+  for (const base of ["hall-b", "halls/b", "lab/halls/b"]) {
+    expect(at(`${base}/api/runs/a/export?format=jsonl`)).toBe("pass");
+    expect(at(`${base}/healthz`)).toBe("pass");
+  }
   expect(at("runs/api")).toBe("page");
 });

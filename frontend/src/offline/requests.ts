@@ -24,7 +24,7 @@ export function handlingOf({ method, mode, url }: AskedFor, scope: string): Hand
   if (method !== "GET" || !url.startsWith(scope)) return "pass";
   const below = url.slice(scope.length).replace(/[?#].*$/, "");
   if (NOT_THE_PAGE.some((start) => below.startsWith(start))) return "pass";
-  if (/^[^/]+\/api\//.test(below)) return "pass"; // of a further runner
+  if (/^([^/]+\/)+(api\/|(healthz|readyz|metrics)$)/.test(below)) return "pass"; // of a further runner
   if (mode === "navigate") return "page";
   if (below.startsWith("assets/")) return "part";
   return /^[\w-]+\.(svg|png|webmanifest)$/.test(below) ? "sign" : "pass";

@@ -51,7 +51,8 @@ export function StopButton() {
   const calm = now.link === "live" && all === 0 && silent.length === 0;
   const unknown = unheardRobots(now).length + silent.filter(hasNoRobot).length;
   const target = meant?.words ?? "everything that runs";
-  const beside = meant !== null && all > here.length;
+  const isUnseen = now.link !== "live" || silent.length > 0; // more may run than this page knows
+  const beside = meant !== null && (all > here.length || isUnseen);
   // One text in each element: what a translation wraps is then replaced whole.
   return (
     <span className={style.both} data-beside={beside || undefined}>
@@ -84,7 +85,7 @@ export function StopButton() {
           <span className={style.read}>
             Stop everything that runs, everywhere. Software stop, no emergency stop
           </span>
-          <span aria-hidden>{`ALL ${all}`}</span>
+          <span aria-hidden>{`ALL ${isUnseen ? "?" : all}`}</span>
         </button>
       )}
     </span>
