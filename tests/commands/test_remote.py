@@ -22,7 +22,7 @@ from action_assistant.commands import stop
 from action_assistant.commands.client import Server
 from action_assistant.commands.presses import press
 from action_assistant.commands.remote import verdict
-from action_assistant.commands.stop import insisting, stopped_as
+from action_assistant.commands.stop import Run, insisting, stopped_as
 from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
@@ -324,7 +324,8 @@ def test_a_stop_insists_where_connections_break() -> None:
         serving = runner.submit(serve)
         with httpx.Client(trust_env=False) as client:
             url = f"http://127.0.0.1:{listener.getsockname()[1]}"
-            assert insisting(Server(client, url), "POST", "/api/stop") == {"runs": []}
+            kind = dict[str, list[str]]
+            assert insisting(Server(client, url), "POST", "/api/stop", kind) == {"runs": []}
         serving.result(5)
 
 
@@ -396,11 +397,16 @@ def test_a_run_is_stopped_while_no_editor_answers(product: Product, files: dict[
     assert (answer.returncode, answer.stdout) == (0, "stopped\n"), answer.stderr
 
 
-def rested(state: str, by: str | None = None, how: str = "", detail: str = "") -> dict[str, Any]:
+def rested(state: str, by: str | None = None, how: str = "", detail: str = "") -> Run:
     """Return a run that is over, as the runner shows it. `by`: who saw it at rest."""
-    seen = {"by": {"id": "b", "name": by} if by else None, "at": "", "how": how} if how else None
-    known = {"number": 7, "graph_name": "patrol", "unconfirmed": None}
-    return known | {"state": state, "at_rest": seen, "detail": detail}
+    return {
+        "number": 7,
+        "graph_name": "patrol",
+        "unconfirmed": None,
+        "state": state,
+        "detail": detail,
+        "at_rest": {"by": {"name": by} if by else None, "how": how} if how else None,
+    }
 
 
 @pytest.mark.parametrize(
@@ -430,9 +436,7 @@ def rested(state: str, by: str | None = None, how: str = "", detail: str = "") -
         (rested("stopped"), True, "run 7 of patrol was over already: stopped"),
     ],
 )
-def test_a_stop_says_how_the_run_came_to_rest(
-    run: dict[str, Any], was_over: bool, said: str
-) -> None:
+def test_a_stop_says_how_the_run_came_to_rest(run: Run, was_over: bool, said: str) -> None:
     words = stopped_as(run, was_over=was_over)
     assert said in words
     assert (words == "stopped") == (said == "stopped")

@@ -3,8 +3,13 @@
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict
 from urllib.parse import unquote
+
+import msgspec
 
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
@@ -15,6 +20,19 @@ if TYPE_CHECKING:
 
 _SIMULATOR: Final = "simulator"  # each runner has one
 _UNKNOWN: Final = 404
+_TWINS_S: Final = 2.0  # in which other sites may still say that they have a robot of this name, too
+
+
+class _Named(TypedDict):
+    name: str
+
+
+class _Identified(TypedDict):
+    id: str
+
+
+class _Queue(TypedDict):
+    entries: list[_Identified]
 
 
 class Heard(NamedTuple):
@@ -95,15 +113,34 @@ class Runners:
         answered."""
 
         def ask(site: Site) -> Heard:
-            try:
-                return Heard(site, self._send(method, site.url + path, **body), None)
-            except (RequestRefused, CannotStart) as error:
-                return Heard(site, None, error)
+            return self._heard(site, method, path, **body)
 
         if not self.has_several:
             return [ask(self.sites[0])]
         with ThreadPoolExecutor(len(self.sites)) as pool:
             return list(pool.map(ask, self.sites))
+
+    def _heard(self, site: Site, method: str, path: str, **body: Any) -> Heard:
+        try:
+            return Heard(site, self._send(method, site.url + path, **body), None)
+        except (RequestRefused, CannotStart) as error:
+            return Heard(site, None, error)
+
+    def _answers(self, path: str, kind: object) -> SimpleQueue[Heard]:
+        """Get a path from all sites at once, and return the queue into which each puts its answer, so
+        that nobody waits for a site that hangs. An answer that is not of this kind is none."""
+        answers: SimpleQueue[Heard] = SimpleQueue()
+
+        def ask(site: Site) -> None:
+            heard = Heard(site, None, CannotStart(f"{site.url} could not be asked."))
+            try:
+                heard = _readable(self._heard(site, "GET", path), kind)
+            finally:
+                answers.put(heard)
+
+        for site in self.sites:
+            Thread(target=ask, args=(site,), daemon=True).start()
+        return answers
 
     def tell(
         self, method: str, path: str, *, gone: frozenset[int] = frozenset(), **body: Any
@@ -190,9 +227,12 @@ class Runners:
         if path in self._homes:
             return self._homes[path]
         silent = []
-        for heard in self.each("GET", path):
+        is_queue = path == "/api/queue"
+        answers = self._answers(path, _Queue if is_queue else _Identified)
+        for _ in self.sites:
+            heard = answers.get()
             if heard.answer is not None and holds(heard.answer.json()):
-                if path != "/api/queue":
+                if not is_queue:
                     self._homes[path] = heard.site
                 return heard.site
             if heard.error is not None and heard.status != _UNKNOWN:
@@ -207,11 +247,15 @@ class Runners:
         wanted = {each for each in robots if each != _SIMULATOR}
         if not wanted:
             return None
-        heard = self.each("GET", "/api/robots")
-        homes = {
-            robot: [each.site for each in heard if each.answer and robot in _names(each.answer)]
-            for robot in sorted(wanted)
-        }
+        answers = self._answers("/api/robots", list[_Named])
+        homes: dict[str, list[Site]] = {robot: [] for robot in sorted(wanted)}
+        heard: list[Heard] = []
+        with suppress(Empty):
+            while len(heard) < len(self.sites):
+                heard.append(answers.get(timeout=_TWINS_S if all(homes.values()) else None))
+                named = {each.site: _names(each.answer) for each in heard if each.answer}
+                for robot in homes:
+                    homes[robot] = [site for site in self.sites if robot in named.get(site, ())]
         silent = [each for each in heard if each.error is not None]
         if silent and not all(homes.values()):
             raise self._named(silent)
@@ -219,6 +263,18 @@ class Runners:
         if len(found) > 1:
             raise RequestRefused(_of_several(homes))
         return next(iter(found), None)
+
+
+def _readable(heard: Heard, kind: object) -> Heard:
+    """Return an answer, or an error in its place if its JSON is not of this type."""
+    if heard.answer is None:
+        return heard
+    try:
+        msgspec.json.decode(heard.answer.content, type=kind)
+    except (ValueError, RecursionError) as error:
+        said = f"{heard.answer.request.url} answers in another form than this version expects ({error})."
+        return Heard(heard.site, None, CannotStart(said))
+    return heard
 
 
 def _of_several(homes: Mapping[str, list[Site]]) -> str:

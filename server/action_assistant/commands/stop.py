@@ -6,9 +6,9 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple, NotRequired, TypedDict, TypeVar
 
-from action_assistant.commands.client import Server, add_server, running
+from action_assistant.commands.client import Server, add_server, decoded, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 
@@ -20,7 +20,53 @@ _NOT_FOUND: Final = 404
 _STOP_ANSWER_S: Final = 10.0  # after which a runner that is silent about a Stop is called silent
 _LOOK_AT_ROBOT: Final = "Look at the robot; use its hardware stop."
 
-Run: TypeAlias = dict[str, Any]
+T = TypeVar("T")
+
+
+class _Stopping(TypedDict):
+    """The answer to a Stop. `runs`: ids; `graphs`: of other programs, by robot; `unknown`: why it is not
+    known what a robot runs, by robot."""
+
+    runs: list[str]
+    graphs: NotRequired[dict[str, list[str]]]
+    unknown: NotRequired[dict[str, str]]
+
+
+class _Person(TypedDict):
+    name: str
+
+
+class _Seen(TypedDict):
+    """A person, or the runner where `by` is None, saw a run at rest."""
+
+    by: _Person | None
+    how: str
+
+
+class Run(TypedDict):
+    """The part of a run's JSON that says whether it is at rest."""
+
+    number: int
+    graph_name: str
+    state: str
+    detail: str
+    unconfirmed: str | None
+    at_rest: _Seen | None
+
+
+class _Held(TypedDict):
+    """A graph that a robot runs."""
+
+    graph: str
+    active: bool
+    stopping: str | None
+
+
+class _Robot(TypedDict):
+    name: str
+    state: str
+    holds: list[_Held]
+    why: NotRequired[str]
 
 
 def _add_stop(stop: argparse.ArgumentParser) -> None:
@@ -35,14 +81,14 @@ def _add_stop(stop: argparse.ArgumentParser) -> None:
 COMMANDS: Final = {"stop": _add_stop}
 
 
-def insisting(server: Server, method: str, path: str) -> Any:
-    """Send a request about a Stop to the runner and return the answer's JSON; repeat it while the
-    connection fails, or a proxy says that nobody answers. Raise RequestRefused if it is refused,
-    CannotStart after some seconds without an answer."""
+def insisting(server: Server, method: str, path: str, kind: type[T]) -> T:
+    """Send a request about a Stop to the runner and return the answer's JSON as this type; repeat it
+    while the connection fails, a proxy says that nobody answers, or the answer has another form. Raise
+    RequestRefused if it is refused, CannotStart after some seconds without an answer."""
     deadline = time.monotonic() + _INSIST_S
     while True:
         try:
-            return server.runner(method, path, timeout=_STOP_ANSWER_S).json()
+            return decoded(server.runner(method, path, timeout=_STOP_ANSWER_S), kind)
         except RequestRefused as error:
             if error.status not in _NOBODY_ANSWERS:
                 raise
@@ -99,6 +145,7 @@ def _stop_at_sites(server: Server, options: argparse.Namespace) -> int:
     delays no other. The site of a single run is not known, so all are asked, and only those that have
     it count. Raise the error of a site if no site has the run."""
     failed: dict[str, RequestRefused | CannotStart] = {}
+    faults: list[BaseException] = []
     doubts = found = 0
     with ThreadPoolExecutor(len(server.runners.sites)) as pool:
         asked = {
@@ -106,16 +153,22 @@ def _stop_at_sites(server: Server, options: argparse.Namespace) -> int:
         }
         for each in as_completed(asked):
             name = asked[each].name
-            try:
-                stopped = each.result()
-            except (RequestRefused, CannotStart) as error:
-                failed[name] = error
-                if options.all:
-                    _Stopped([str(error)], ()).print(f"{name}: ")
-                continue
-            found += 1
-            doubts += len(stopped.doubts)
-            stopped.print(f"{name}: ")
+            match each.exception():
+                case None:
+                    stopped = each.result()
+                    found += 1
+                    doubts += len(stopped.doubts)
+                    stopped.print(f"{name}: ")
+                case RequestRefused() | CannotStart() as error:
+                    failed[name] = error
+                    if options.all:
+                        _Stopped([str(error)], ()).print(f"{name}: ")
+                case fault:  # raised when all sites have said what they have
+                    faults.append(fault)
+                    said = f"STOP UNCONFIRMED. {fault!r}. {_LOOK_AT_ROBOT}"
+                    _Stopped([said], ()).print(f"{name}: ")
+    if faults:
+        raise faults[0]
     if options.all or found:
         return 1 if doubts or (options.all and failed) else 0
     silent = {name: error for name, error in failed.items() if _is_silent(error)}
@@ -138,8 +191,8 @@ def _stopped(server: Server, options: argparse.Namespace) -> _Stopped:
         ids = [options.run] if is_over and _is_run(server, options.run) else asked["runs"]
         deadline = time.monotonic() + options.wait
         while True:
-            runs = [insisting(server, "GET", f"/api/runs/{run}") for run in ids]
-            robots = insisting(server, "GET", "/api/robots") if others else []
+            runs = [insisting(server, "GET", f"/api/runs/{run}", Run) for run in ids]
+            robots = insisting(server, "GET", "/api/robots", list[_Robot]) if others else []
             graphs = _unproven(others, robots)
             settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
             if (settled and not graphs) or time.monotonic() > deadline:
@@ -168,11 +221,11 @@ def _reached_for_stop(options: argparse.Namespace) -> Iterator[Server]:
         yield server
 
 
-def _sent(server: Server, path: str) -> Any:
-    """Send a Stop and return the answer's JSON. Raise CannotStart, with a sentence that the Stop may
+def _sent(server: Server, path: str) -> _Stopping:
+    """Send a Stop and return the answer. Raise CannotStart, with a sentence that the Stop may
     not have arrived, if none comes."""
     try:
-        return insisting(server, "POST", path)
+        return insisting(server, "POST", path, _Stopping)
     except CannotStart as error:
         raise CannotStart(f"NO ANSWER TO THE STOP. {error} {_LOOK_AT_ROBOT}") from error
 
@@ -196,7 +249,7 @@ def _is_run(server: Server, run: str) -> bool:
     """Return whether an id is that of a run; False if it is the id of a group. Raise CannotStart if
     the server does not answer."""
     try:
-        insisting(server, "GET", f"/api/runs/{run}")
+        insisting(server, "GET", f"/api/runs/{run}", Run)
     except RequestRefused:
         return False
     return True
@@ -235,20 +288,19 @@ def _unconfirmed(run: Run) -> str:
     return f"{said} {_why(run)}{_LOOK_AT_ROBOT}"
 
 
-def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:
+def _unproven(stopped: dict[str, list[str]], robots: list[_Robot]) -> list[str]:
     """Return one sentence for each graph of `stopped` that is not proven to be at rest. `stopped`:
     the graphs of other programs that got a Stop, by robot; `robots`: the robots as JSON."""
     known = {robot["name"]: robot for robot in robots}
     found: list[str] = []
     for name, graphs in stopped.items():
         robot = known.get(name)
-        holds = {} if robot is None else {each["graph"]: each for each in robot["holds"]}
+        holds = {each["graph"]: each for each in ([] if robot is None else robot["holds"])}
         silent = robot is None or robot["state"] not in {"answering", "restarted"}
         for graph in graphs:
             held = holds.get(graph)
             if silent or (held is not None and (held["active"] or held["stopping"] is not None)):
-                why = (
-                    (held or {}).get("stopping") or (robot or {}).get("why") or "no proof has come"
-                )
+                said = held["stopping"] if held is not None else None
+                why = said or (robot.get("why") if robot is not None else "") or "no proof has come"
                 found.append(f"{graph} on {name}: {why.rstrip('.')}")
     return found
