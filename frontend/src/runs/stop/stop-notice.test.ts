@@ -270,3 +270,14 @@ test("a later Stop of the same run, of its group or of everything takes the plac
   const said = runnerNotice(withStops(all, { ...stop, at: 1500 }), NONE, 2500);
   expect(said?.text).toMatch(/^NOT SENT: .* Stopping run 7 …$/);
 });
+
+test("a Stop of somebody else that is unconfirmed stays in sight beside one's own that is proven", () => {
+  const { runs, ...state } = withStops(proven);
+  const theirs = { ...runs.get("r"), desired: "stopped", unconfirmed: "no answer" } as Run;
+  const both = { ...state, runs: new Map(runs).set("r", theirs) };
+  const notice = runnerNotice(both, NONE, 2500);
+  expect(notice).toMatchObject({ tone: "loud", stays: true });
+  expect(notice?.text).toMatch(/^STOP UNCONFIRMED: run 7 .* Run 8: stopped\.$/);
+  const mine = runnerNotice({ ...both, stops: [stop] }, NONE, 2500);
+  expect(mine?.text).toBe("Stopping run 7 …"); // its own notice tells of it, in time
+});

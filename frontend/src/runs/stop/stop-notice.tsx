@@ -191,12 +191,14 @@ export function movingAgain(now: LiveState): StopNoticeText {
 
 /**
  * Return the notice about Stops that other people asked for and that are not proven: everybody sees
- * it.
+ * it. `own`: the runs of which another notice tells.
  */
-export function othersNotice(now: LiveState): StopNoticeText {
+export function othersNotice(now: LiveState, own: ReadonlySet<Run> = new Set()): StopNoticeText {
   if (now.link === "down") return null;
   const shouting = openRuns(now).filter(
-    (run) => Boolean(run.unconfirmed) || (run.desired === "stopped" && reasonOf(run) !== ""),
+    (run) =>
+      !own.has(run) &&
+      (Boolean(run.unconfirmed) || (run.desired === "stopped" && reasonOf(run) !== "")),
   );
   if (shouting.length > 0) return unconfirmed(shouting);
   const foreign = foreignNotice(now);
@@ -234,7 +236,7 @@ export function withOwnStops(now: LiveState, sites: readonly SiteState[]): LiveS
  * Return the Stops of which a notice tells, the newest first: the last one, and each earlier one that is not
  * dealt with. `dismissed`: the ids of the Stops of which nobody wants to hear more, unless they could not be sent.
  */
-export function toldStops(now: LiveState, dismissed: ReadonlySet<string>): StopRequest[] {
+function toldStops(now: LiveState, dismissed: ReadonlySet<string>): StopRequest[] {
   const isDue = (stop: StopRequest, i: number) =>
     i === now.stops.length - 1 ||
     stop.state !== "heard" ||
@@ -255,20 +257,17 @@ function isCovered(stop: StopRequest, later: readonly StopRequest[], now: LiveSt
   return later.some(means);
 }
 
-/** Return one notice of several Stops, the worst first: none hides another one. */
-function noticeOfStops(stops: readonly StopRequest[], now: LiveState, at: number): StopNoticeText {
-  const found = stops.map((stop) => ({ stop, notice: noticeOf(stop, now, at) }));
-  const worst = TONES.flatMap((tone) => found.filter(({ notice }) => notice?.tone === tone));
-  const first = worst[0]?.notice ?? null;
-  if (first === null || worst.length === 1) return first;
-  const textsOf = (parts: typeof worst) => [
-    ...new Set(parts.map(({ stop, notice }) => textOf(stop, notice?.text ?? "", now))),
-  ];
-  const loud = textsOf(worst.filter(({ notice }) => notice?.tone === "loud"));
+/** Return one notice of several, the worst first: none hides another one. */
+function worstFirst(notices: readonly NonNullable<StopNoticeText>[]): StopNoticeText {
+  const worst = TONES.flatMap((tone) => notices.filter((notice) => notice.tone === tone));
+  const [first, ...others] = worst;
+  if (first === undefined || others.length === 0) return first ?? null;
+  const textsOf = (parts: typeof worst) => [...new Set(parts.map(({ text }) => text))];
+  const loud = textsOf(worst.filter(({ tone }) => tone === "loud"));
   return {
     ...first,
     text: textsOf(worst).join(" "),
-    ...(worst.some(({ notice }) => notice?.stays) && { stays: true }),
+    ...(worst.some(({ stays }) => stays) && { stays: true }),
     ...(loud.length > 1 && { loud: loud.map((text) => ({ text })) }),
   };
 }
@@ -286,10 +285,18 @@ export function runnerNotice(
   dismissed: ReadonlySet<string>,
   at: number,
 ): StopNoticeText {
+  const own = toldStops(now, dismissed).flatMap((stop) => {
+    const notice = noticeOf(stop, now, at);
+    return notice === null ? [] : [{ stop, notice }];
+  });
+  const others = othersNotice(now, new Set(own.flatMap(({ stop }) => stopTargets(stop, now))));
+  const isOne = own.length === 1 && others === null;
+  const told = own.map(({ stop, notice }) =>
+    isOne ? notice : { ...notice, text: textOf(stop, notice.text, now) },
+  );
   return (
     movingAgain(now) ??
-    noticeOfStops(toldStops(now, dismissed), now, at) ??
-    othersNotice(now) ??
+    worstFirst(others === null ? told : [...told, others]) ??
     unreachableNotice(now, at)
   );
 }
