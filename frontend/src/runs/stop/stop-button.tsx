@@ -51,7 +51,7 @@ export function StopButton() {
   const calm = now.link === "live" && all === 0 && silent.length === 0;
   const unknown = unheardRobots(now).length + silent.filter(hasNoRobot).length;
   const target = meant?.words ?? "everything that runs";
-  const isUnseen = now.link !== "live" || silent.length > 0; // more may run than this page knows
+  const isUnseen = now.link === "live" && silent.length > 0; // more may run than this page knows
   const beside = meant !== null && (all > here.length || isUnseen);
   // One text in each element: what a translation wraps is then replaced whole.
   return (
