@@ -54,7 +54,7 @@ const PAGE = "src/app/main.tsx";
  */
 const BUDGETS: readonly (readonly [page: string, most: number, entries: readonly string[]])[] = [
   ["STOP alone", 87, []],
-  ["the list of graphs", 178, [PAGE, "home"]],
+  ["the list of graphs", 179, [PAGE, "home"]],
   ["the editor", 335, [PAGE, "editor"]],
   ["administration", 166, [PAGE, "src/administration/administration-page.tsx"]],
   ["robots", 237, [PAGE, "src/robots/robots-page.tsx"]],
