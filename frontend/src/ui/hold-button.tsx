@@ -19,7 +19,7 @@ interface Props {
   disabled?: boolean;
   size?: ButtonProps["size"];
   icon?: ReactNode;
-  /** Nothing moves: a press is enough. */
+  /** Whether a press is enough, since nothing moves. */
   isPress?: boolean;
   onHeld: () => void;
 }

@@ -186,7 +186,7 @@ def test_uses_are_updated_with_the_renames_that_were_asked_for(
         },
     )
     assert updated.status_code == 200, updated.text
-    assert updated.json() == [{"graph": other, "seq": 2, "changed": True}]
+    assert updated.json() == [{"graph": other, "seq": 2, "changed": True, "refused": ""}]
     assert listed(http, name)["differs_in"] == []
     actions = http.get(f"/api/graphs/{other}/umrf").json()["actions"]
     assert [each.get("input_parameters", {}).get("place") for each in actions] == [*goals, None]

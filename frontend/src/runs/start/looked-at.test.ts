@@ -47,10 +47,20 @@ test("a press whose answer got lost has the same request id after the page was l
   const sessionStorage = {
     getItem: (key: string) => kept.get(key) ?? null,
     setItem: (key: string, text: string) => void kept.set(key, text),
+    removeItem: (key: string) => void kept.delete(key),
   };
   vi.stubGlobal("sessionStorage", sessionStorage);
-  /** Loads the page again, and presses. */
-  async function loaded(answer: (kind: typeof Refusal) => Promise<string>): Promise<string> {
+  let leave = () => {};
+  vi.stubGlobal("addEventListener", (name: string, heard: () => void) => {
+    if (name === "pagehide") leave = heard;
+  });
+  /** Loads the page again, with these presses handed over if any are given, and presses. */
+  async function loaded(
+    answer: (kind: typeof Refusal) => Promise<string>,
+    handedOver?: string,
+  ): Promise<string> {
+    leave();
+    if (handedOver !== undefined) kept.set("aa.presses", handedOver);
     vi.resetModules();
     const page = await import("./looked-at");
     const http = await import("../../api/http");
@@ -71,8 +81,7 @@ test("a press whose answer got lost has the same request id after the page was l
   expect(next).not.toBe(first);
   expect(await loaded(() => Promise.resolve("there"))).not.toBe(next);
   for (const damaged of ["{", "7", "null"]) {
-    kept.set("aa.presses", damaged);
-    expect(await loaded(() => Promise.resolve("there"))).not.toBe("");
+    expect(await loaded(() => Promise.resolve("there"), damaged)).not.toBe("");
   }
   vi.unstubAllGlobals();
 });
