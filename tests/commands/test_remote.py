@@ -164,6 +164,39 @@ def test_expected_courses_are_simulated_again_and_a_changed_graph_is_told(
     assert "B_0 is told to run" in now["why"]
 
 
+@pytest.mark.parametrize(
+    ("how", "apart"),
+    [
+        ((), "B_0 is told to run"),
+        (("--robots", "=simulator", "--into"), "cannot be led one by one"),
+    ],
+)
+def test_expected_courses_with_sub_graphs_are_simulated_again_as_they_ran(
+    product: Product, files: dict[str, str], how: tuple[str, ...], apart: str
+) -> None:
+    name = "opened" if how else "whole"
+    end = {"graph_entry": [{"name": name}], "graph_exit": [{"name": name}]}
+    outer = {"graph_name": f"with {name}", **end, "actions": [{"name": name, "type": "sync"}]}
+    with product.editor() as editor:
+        inner = editor.post("/api/graphs", json={**GRAPH, "graph_name": name}).json()["id"]
+        graph = editor.post("/api/graphs", json=outer).json()["id"]
+    answer = product.cli("run", graph, *how, "--script", files["quick"])
+    assert answer.returncode == 0, answer.stderr
+    with product.runner() as runner:
+        wanted = {"run": answer.stdout.split()[0], "name": name}
+        saved = runner.post("/api/expectations", json=wanted)
+        assert saved.status_code == 201, saved.text
+        assert "B_0" in str(saved.json()["course"])
+    answer = product.cli("runs", "verify", "--graph", graph)
+    assert answer.stdout.splitlines() == [f"same     {name} (then)", f"same     {name} (now)"]
+    anyio.run(cut, product, inner)
+    answer = product.cli("runs", "verify", "--graph", graph)
+    assert answer.returncode == 1
+    then, now, why = answer.stdout.splitlines()
+    assert (then, now) == (f"same     {name} (then)", f"DIFFERS  {name} (now)")
+    assert apart in why
+
+
 @pytest.mark.long
 def test_the_edit_that_made_a_run_go_another_way_is_named(
     product: Product, files: dict[str, str]

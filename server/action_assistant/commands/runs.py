@@ -3,8 +3,9 @@
 import argparse
 import asyncio
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -267,7 +268,8 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVer
     for each in msgspec.json.decode(answer, type=list[Expectation]):
         if wanted is not None and each.graph != wanted:
             continue
-        yield _verdict(each, bytes(each.umrf), "then")
+        inside = {sub.name: bytes(sub.umrf) for sub in each.subgraphs}
+        yield _verdict(each, bytes(each.umrf), inside, "then")
         if each.graph is not None:
             yield _now(server, each, each.graph)
 
@@ -275,31 +277,45 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVer
 def _now(server: Server, each: "Expectation", graph: str) -> VerifyVerdict:
     """Compare an expected run (`each`) with the present state of its graph (an id), and return the
     verdict; it is negative if the graph does not exist any more."""
+    from action_assistant.editor.catalogue.versions import InsideView
+
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
+        found = decoded(server.editor("GET", f"/api/graphs/{graph}/subgraphs"), InsideView)
     except RequestRefused as error:
         return VerifyVerdict(
             name=each.name, run=each.run, against="now", same=False, why=str(error)
         )
-    return _verdict(each, umrf, "now")
+    inside = {sub.name: bytes(sub.umrf) for sub in found.subgraphs}
+    return _verdict(each, umrf, inside, "now")
 
 
-def _verdict(each: "Expectation", umrf: bytes, against: Literal["then", "now"]) -> VerifyVerdict:
+def _verdict(
+    each: "Expectation",
+    umrf: bytes,
+    subgraphs: Mapping[str, bytes],
+    against: Literal["then", "now"],
+) -> VerifyVerdict:
+    """Simulate an expected run (`each`) with a graph (`umrf`) and the graphs inside of it by name
+    (`subgraphs`), and return the verdict."""
     from action_assistant.umrf.courses.expected import check_expected
     from action_assistant.umrf.files import codec
+    from action_assistant.umrf.hierarchy.opening import CannotOpen, opened
     from action_assistant.umrf.semantics import script_from
 
     script = script_from(msgspec.json.decode(each.script))
+    verdict = partial(VerifyVerdict, name=each.name, run=each.run, against=against)
     try:
         was, now = codec.read(bytes(each.umrf)).graph, codec.read(umrf).graph
+        inside = {name: codec.read(text).graph for name, text in subgraphs.items()}
+        if each.opened and against == "now":
+            now = opened(now, inside).graph
     except codec.Unreadable as wrong:
-        return VerifyVerdict(
-            name=each.name, run=each.run, against=against, same=False, why=wrong.message
-        )
-    check = check_expected(was, each.course, script, now)
-    return VerifyVerdict(
-        name=each.name, run=each.run, against=against, same=check.apart is None, why=check.why
-    )
+        return verdict(same=False, why=wrong.message)
+    except CannotOpen as why:
+        return verdict(same=False, why=str(why))
+    check = check_expected(was, each.course, script, now, inside)
+    return verdict(same=check.apart is None, why=check.why)
 
 
 def _add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -972,7 +972,8 @@ export interface RunnerApi {
     };
     /**
      * Expectation
-     * @description A saved expectation, with everything that simulating it again takes.
+     * @description A saved expectation, with everything that simulating it again takes. `subgraphs`: the graphs
+     *     inside; `opened`: the run had opened them, and `umrf` is the opened graph.
      */
     Expectation: {
         name: string;
@@ -988,6 +989,8 @@ export interface RunnerApi {
             [key: string]: unknown;
         };
         course: RunnerApi["ExpectedStep"][];
+        subgraphs: RunnerApi["SubgraphShown"][];
+        opened: boolean;
     };
     /**
      * ExpectedStep

@@ -22,9 +22,11 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import (
     SentGraph,
     SentSubgraph,
+    SubgraphShown,
     graphs_in,
     read_inside,
     read_sent,
+    subgraphs_shown,
 )
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.safe_text import hold_names
@@ -55,7 +57,8 @@ class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class Expectation(msgspec.Struct, frozen=True, kw_only=True):
-    """A saved expectation, with everything that simulating it again takes."""
+    """A saved expectation, with everything that simulating it again takes. `subgraphs`: the graphs
+    inside; `opened`: the run had opened them, and `umrf` is the opened graph."""
 
     name: str
     run: str
@@ -65,6 +68,8 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     umrf: UmrfGraph
     script: JsonObject
     course: list[ExpectedStep]
+    subgraphs: list[SubgraphShown]
+    opened: bool
 
 
 class Doubt(msgspec.Struct, frozen=True):
@@ -331,6 +336,8 @@ def expectation_view(saved: Expected) -> Expectation:
         umrf=msgspec.Raw(saved.umrf.encode()),
         script=msgspec.Raw(saved.script.encode()),
         course=list(saved.course),
+        subgraphs=subgraphs_shown(saved.subgraphs),
+        opened=saved.opened,
     )
 
 

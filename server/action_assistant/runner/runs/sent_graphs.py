@@ -184,11 +184,11 @@ def sent_of(start: Requested) -> Sent:
     return Sent(start.umrf, sent(start.umrf), start.subgraphs, start.tree_digest)
 
 
-def subgraphs_shown(start: Sent) -> list[SubgraphShown]:
-    """Return the sub-graphs of a sent graph as the API shows them."""
+def subgraphs_shown(subgraphs: Sequence[RunSubgraph]) -> list[SubgraphShown]:
+    """Return the recorded sub-graphs of a sent graph as the API shows them."""
     return [
         SubgraphShown(
             each.name, each.version, each.digest, msgspec.Raw(each.umrf.encode()), each.graph
         )
-        for each in start.subgraphs
+        for each in subgraphs
     ]

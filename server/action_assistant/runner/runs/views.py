@@ -441,7 +441,7 @@ def whole_view(
         despite=list(run.despite),
         sent=graph.values,
         archived=archived(place),
-        subgraphs=subgraphs_shown(graph),
+        subgraphs=subgraphs_shown(graph.subgraphs),
         tree_digest=graph.tree_digest,
         earlier=None if run.earlier is None else earlier_view(run.earlier, run.start_from),
         limits=run.limits,
