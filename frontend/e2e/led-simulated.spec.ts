@@ -315,6 +315,34 @@ test("a step goes into a sub-graph that is opened, and over it", async () => {
   ]);
 });
 
+test("a part of a graph begins by no double click and no drag, but in the dialog that looks first", async () => {
+  const { page } = ada;
+  const before = await runs();
+  await page.goto(`${product.url}/graphs/${await line("parts", 3)}`);
+  await saved(page);
+  const at = { position: { x: 40, y: 24 } };
+  const start = dialog(page).getByRole("button", { name: /^Run v\d+ in the simulator$/ });
+  await page.keyboard.press("Control+a");
+  await card(page, "Grip").dblclick(at);
+  await card(page, "Grip").dragTo(card(page, "Lift"), { sourcePosition: at.position });
+  for (const name of ["Run from here …", "Run only this …"]) {
+    const choose = async () => {
+      await page.keyboard.press("Escape");
+      await card(page, "Drive").click({ button: "right", ...at });
+      return page.getByRole("menuitem", { name });
+    };
+    await (await choose()).dragTo(card(page, "Lift"));
+    await expect(start).toBeHidden();
+    await (await choose()).dblclick();
+    await (await choose()).click();
+    await expect(start).toBeEnabled({ timeout: 15_000 });
+    await start.dragTo(dialog(page).getByRole("heading").first());
+    await page.keyboard.press("Escape");
+    await expect(dialog(page)).toBeHidden();
+  }
+  expect(await runs()).toEqual(before);
+});
+
 test("a dry-run begins at an action, or plays nothing else", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/graphs/${await line("middle", 3)}`);
