@@ -108,3 +108,12 @@ test.each([
 ])("a question that closed since it was %s says so", (why, words) => {
   expect(markText({ kind: "run.question_closed.v1", by: "", text: why })).toBe(words);
 });
+
+test("the first line names where a run was started, and a run that only asks people has no robot", () => {
+  const run = ran("2026-11-20T09:00:01.100Z", "2026-11-20T09:00:02.000Z");
+  const first = (more: Partial<Run>) =>
+    eventLines({ ...run, ...more }, "v1")[0]?.text.replace(/[\u2066-\u2069]/g, "");
+  expect(first({})).toBe("Ada started v1 in the simulator");
+  expect(first({ engine: "David", simulated: false })).toBe("Ada started v1 on David");
+  expect(first({ robots: {} })).toBe("Ada started v1, which only asks people");
+});

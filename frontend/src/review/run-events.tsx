@@ -152,9 +152,14 @@ export function eventLines(
     });
   all.sort((a, b) => a.at - b.at || (a.order ?? 0) - (b.order ?? 0));
   if (start === null) return all;
-  const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
-  const text = `${isolated(by)} started ${version} ${where}`;
+  const text = `${isolated(by)} started ${version}${placeWords(runPlace(run))}`;
   return [{ at: start, tone: "idle", name: null, fact: null, text }, ...all];
+}
+
+/** Return where a run was started, for the end of a sentence; a run that only asks people has no place. */
+function placeWords(place: string): string {
+  if (place === "") return ", which only asks people";
+  return place === "simulator" ? " in the simulator" : ` on ${place}`;
 }
 
 interface Props {

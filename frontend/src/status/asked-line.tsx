@@ -30,7 +30,12 @@ export function AskedLine({ below = false }: { below?: boolean }) {
   const { run, question } = first;
   const more = mine.length > 1 ? ` and ${mine.length - 1} more` : "";
   return (
-    <span role="alert" className={style.alert} data-below={below || undefined}>
+    <span
+      role="alert"
+      className={style.alert}
+      data-below={below || undefined}
+      data-asked={!below || undefined}
+    >
       <Link
         to={`/runs/${run.id}`}
         className={style.line}

@@ -146,7 +146,7 @@ export function WayChoice({ led, several, onLed }: WayProps) {
       {ways.map(({ value, name, means }) => (
         <label key={name} className={dialogStyle.choice} data-on={led === value || undefined}>
           <input type="radio" name="way" checked={led === value} onChange={() => onLed(value)} />
-          <span>
+          <span className="fill">
             <span className="weight-550">{name}</span>
             <span className={style.means}>{means}</span>
           </span>
