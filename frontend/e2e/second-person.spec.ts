@@ -35,8 +35,8 @@ async function personally(browser: Browser, name: string): Promise<Person> {
   return { context, page, failures };
 }
 
-async function openStart(page: Page): Promise<void> {
-  await page.goto(`${product.url}/graphs/${graph}`);
+async function openStart(page: Page, of = graph): Promise<void> {
+  await page.goto(`${product.url}/graphs/${of}`);
   await saved(page);
   await page.getByRole("button", { name: "Choose where to start" }).click();
   await page.getByRole("checkbox", { name: /^David/ }).check();
@@ -96,6 +96,24 @@ test("what another has said yes to starts", async () => {
   const state = async () =>
     (await product.ask<{ state: string }[]>("/api/runs", {}, product.runnerUrl))[0]?.state;
   await expect.poll(state, { timeout: 20_000 }).toBe("finished");
+});
+
+test("others say yes to a graph that was never started before they choose a robot", async () => {
+  const other = await product.chain(3);
+  const { page } = ada;
+  await openStart(page, other);
+  await dialog(page).getByRole("button", { name: "Ask others for their yes" }).click();
+  await expect(dialog(page)).toContainText("They see it where they start the graph");
+  await ben.page.goto(`${product.url}/graphs/${other}`);
+  await saved(ben.page);
+  await ben.page.getByRole("button", { name: "Choose where to start" }).click();
+  const asked = ben.page.getByRole("region", { name: /Ada.* asks for a second person/ });
+  await expect(asked).toContainText("for David: v1.");
+  await asked.getByRole("button", { name: /^Say yes to exactly this/ }).click();
+  await expect(lookedAt(page)).toContainText("Ben said yes to exactly this graph.", {
+    timeout: 20_000,
+  });
+  await page.keyboard.press("Escape");
 });
 
 test("a yes to single starts is none to a repeat: all of it is asked, and read on a phone", async () => {

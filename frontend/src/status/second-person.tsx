@@ -3,7 +3,7 @@ import { Button, Text } from "@mantine/core";
 import { IconSend, IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { renewing } from "../api/client";
-import { useVersions, versionName } from "../api/graphs";
+import { publish, useVersions, versionName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
@@ -22,6 +22,8 @@ import style from "./second-person.module.css";
 
 interface SecondPersonProps {
   graph: string;
+  /** The moment of a graph that may be no version yet: it becomes one when others are asked for their yes. */
+  seq?: number;
   label: string;
   looks: readonly Preflight[] | undefined;
   /** Values of the start; they are part of what is said yes to. */
@@ -121,7 +123,7 @@ export function SecondPerson(props: SecondPersonProps) {
 }
 
 function OneOrder(props: SecondPersonProps & { demand: Demand }) {
-  const { graph, label, values, taken, changed = false, demand } = props;
+  const { graph, seq, label, values, taken, changed = false, demand } = props;
   const { digest, robots } = demand;
   const { runner = "" } = useLive();
   const { person } = usePerson();
@@ -129,8 +131,11 @@ function OneOrder(props: SecondPersonProps & { demand: Demand }) {
   const given = useApprovals(digest);
   const say = useYes(digest, graph, label);
   const ask = useMutation({
-    mutationFn: () =>
-      askApproval(runner, { digest, robots: [...robots], graph, version: label, values }),
+    mutationFn: async () => {
+      // Others say yes to versions alone.
+      if (seq !== undefined) await publish(graph, seq);
+      return askApproval(runner, { digest, robots: [...robots], graph, version: label, values });
+    },
   });
   const lacks = given.data !== undefined && isMissing(given.data, person.id);
   const mine = given.data?.some(({ author }) => author.id === person.id) ?? true;

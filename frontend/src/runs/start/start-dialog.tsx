@@ -559,6 +559,7 @@ export function StartDialog(props: Props) {
       <SecondPerson
         key={asked.join("/")}
         graph={graph}
+        seq={seq}
         label={label}
         looks={looks}
         values={values ?? {}}
