@@ -19,7 +19,7 @@ import {
   useRepeat,
   useRepeats,
 } from "../api/repeats";
-import type { DurationBounds, Run } from "../api/runs";
+import type { Run } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/progress";
 import { SecondPerson } from "../status/second-person";
@@ -38,8 +38,10 @@ import type { RunBarParts } from "./run-page";
 type Cell = Repeat["cells"][number];
 
 /** Return between which bounds the runs that ended took; "" while none has. */
-export function rangeWords(took: readonly (DurationBounds | null | undefined)[]): string {
-  const known = took.filter((each) => each != null);
+export function rangeWords(
+  runs: readonly (Pick<NonNullable<Cell["run"]>, "ended_at" | "took"> | null)[],
+): string {
+  const known = runs.flatMap((run) => (run?.ended_at && run.took ? [run.took] : []));
   if (known.length === 0) return "";
   const least = Math.min(...known.map((each) => each.least));
   const tops = known.map((each) => each.most);
@@ -224,7 +226,7 @@ function stateWords({ state, closed, next, total }: Repeat): string {
 }
 
 function Found({ repeat, runner }: { repeat: Repeat; runner: string }) {
-  const range = rangeWords(repeat.cells.map(({ run }) => run?.took));
+  const range = rangeWords(repeat.cells.map(({ run }) => run));
   const isDoubted = repeat.closed !== null && repeat.closed.why !== "complete";
   return (
     <div className={style.inner}>
