@@ -158,3 +158,47 @@ test("STOP ALL stops one hall at once while the other is frozen, which is named"
   await expect(alert(page).filter({ hasText: "Hall B" })).toHaveCount(0, { timeout: 20_000 });
   expect(ada.failures).toEqual([]);
 });
+
+test("STOP ALL reaches both halls while a part of the page does not load", async ({ browser }) => {
+  const graph = await product.chain(3);
+  await startOn(ada.page, graph, "Dora");
+  await startOn(ada.page, await product.chain(2), "Carl");
+  await expect.poll(() => stateAt(second.url, "Dora")).toBe("running");
+  await expect.poll(() => stateAt(product.runnerUrl, "Carl")).toBe("running");
+  const bob = await product.person(browser, "Bob");
+  await bob.page.route(/assets\/live-sites-/, (route) => route.abort());
+  await bob.page.goto(`${product.url}/robots`);
+  const stop = bob.page.getByRole("button", { name: /^Stop everything/ });
+  await expect(stop).toContainText("state unknown");
+  await expect(alert(bob.page)).toContainText("STOP goes to each runner", { timeout: 20_000 });
+  await stop.click();
+  await expect.poll(() => stateAt(product.runnerUrl, "Carl")).toBe("stopped");
+  await expect.poll(() => stateAt(second.url, "Dora")).toBe("stopped");
+  const notice = bob.page.getByRole("status").filter({ hasText: /Hall A.*: Run \d+: stopped/ });
+  await expect(notice.filter({ hasText: /Hall B.*: Run \d+: stopped/ })).toBeVisible();
+  await bob.page.unroute(/assets\/live-sites-/);
+  await expect(stop).toContainText("nothing runs", { timeout: 20_000 });
+  expect(bob.failures).toEqual([]);
+});
+
+test("an open page hears of a third hall, and says that it has to be loaded again to reach it", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/robots`);
+  await expect(page.getByRole("button", { name: /^Stop everything/ })).toContainText(
+    "nothing runs",
+  );
+  const third = { name: "Hall C", url: `http://127.0.0.1:${second.port + 1}` };
+  await page.route("**/api/config", async (route) => {
+    const answer = await route.fetch();
+    const config = await answer.json();
+    await route.fulfill({ json: { ...config, runners: [...config.runners, third] } });
+  });
+  await page.getByRole("button", { name: /^Stop everything/ }).click();
+  await expect(page.getByRole("heading", { name: "Hall C" })).toBeVisible();
+  const said = alert(page).filter({ hasText: /NOT SENT at .*Hall C/ });
+  await expect(said).toContainText("reload the page");
+  await page.unroute("**/api/config");
+  await page.reload();
+  await expect(page.getByRole("heading", { name: "Hall B" })).toBeVisible();
+  await expect(page.getByRole("heading", { name: "Hall C" })).toHaveCount(0);
+});

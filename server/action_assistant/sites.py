@@ -18,10 +18,15 @@ _FILE: Final = "runners.json"
 
 
 def sites(
-    given: Iterable[str], *, runner_port: int, public: PublicUrl | None = None, tls: bool = False
+    given: Iterable[str],
+    *,
+    page_port: int,
+    runner_port: int,
+    public: PublicUrl | None = None,
+    tls: bool = False,
 ) -> tuple[Site, ...]:
     """Parse texts NAME=URL, of which the first is the runner beside the editor at `runner_port`, and
-    return the sites; empty without any, since one runner needs no name.
+    return the sites; empty without any, since one runner needs no name. `page_port`: of the editor.
 
     A browser shows a session only to the host of the page. So each runner is at a port of this
     computer, or below the public address. Raise CannotStart, with the text, if one cannot be used.
@@ -36,6 +41,11 @@ def sites(
                 f"{text.strip()!r}."
             )
         _check(site, public)
+        if port_of(site) == page_port:
+            raise CannotStart(
+                f"The runner {name!r} is at {site.url}, the port of the editor itself: a runner has a port "
+                "of its own."
+            )
         for other in found:
             if other.name.casefold() == site.name.casefold():
                 raise CannotStart(f"Two runners are called {name!r}.")

@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 from commands.test_sites import GRAPH, Halls
 from runner.api.test_questions import question_of
 from runner.execution.test_questions import asked_of, asking, line
-from runner.process import started
+from runner.process import over, started
 from support.product import Product
 from support.two_sites import HALL_A, HALL_B, two_sites
 
@@ -32,6 +34,17 @@ def imported(product: Product, folder: Path) -> str:
     """The id of the graph in the editor."""
     (folder / "graph.json").write_text(json.dumps(GRAPH))
     return product.cli("import", str(folder / "graph.json")).stdout.split()[0]
+
+
+def finished_at(client: Any, graph: str, version: str, name: str) -> Any:
+    """A run on the simulator of a runner, as JSON, when it has finished."""
+    order = {"version": version, "digest": digest(codec.read(json.dumps(GRAPH)).graph)}
+    order |= {"umrf": GRAPH, "engine": "simulator", "request_id": name, "graph": graph}
+    answer = client.post("/api/runs", json=order)
+    assert answer.is_success, answer.text
+    run = over(client, answer.json()["id"])
+    assert run["state"] == "finished"
+    return run
 
 
 def test_a_robot_that_two_sites_have_is_taken_away_at_the_one_that_is_named(halls: Halls) -> None:
@@ -93,6 +106,33 @@ def test_the_questions_for_a_second_person_are_those_of_all_sites(
     for each in (missing, repeats):
         assert each.returncode == 1
         assert f"{HALL_B} does not answer, and is left out" in each.stderr
+
+
+def test_the_last_run_that_went_well_may_be_at_another_site_and_is_found_by_its_time(
+    halls: Halls, tmp_path: Path
+) -> None:
+    product, second = halls
+    graph = imported(product, tmp_path)
+    with product.editor() as editor, product.runner() as first, second.client() as other:
+        version = editor.post(f"/api/graphs/{graph}/versions", json={}).json()["id"]
+        for name in ("b 1", "b 2"):  # so that the numbers of both say nothing about each other
+            good = finished_at(other, graph, version, name)
+        bad = finished_at(first, graph, version, "a")
+        assert good["number"] > bad["number"]
+        found = product.cli("runs", "since", bad["id"])
+        assert "No edit explains it" in found.stdout, found.stderr
+        expected = {"run": good["id"], "name": "of hall B"}
+        assert other.post("/api/expectations", json=expected).status_code == 201
+    verified = product.cli("runs", "verify", "--graph", graph)
+    assert (verified.returncode, len(verified.stdout.splitlines())) == (0, 2), verified.stderr
+    assert "of hall B (now)" in verified.stdout
+    second.end()
+    try:
+        missing = product.cli("runs", "verify")
+    finally:
+        second.start()
+    assert missing.returncode == 1
+    assert f"{HALL_B} does not answer, and is left out" in missing.stderr
 
 
 @pytest.mark.usefixtures("new_interpreters")  # forks have no rclpy, so no robot for the check

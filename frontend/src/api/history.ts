@@ -7,6 +7,7 @@ import type { GraphSummary } from "./graphs";
 import { recordedScriptOf } from "./review";
 import type { Run } from "./runs";
 import type { EditorApi } from "./schema/editor";
+import { type AgedRun, newerFirst } from "./sites";
 
 export type HistoryEntry = EditorApi["HistoryEntry"];
 
@@ -132,23 +133,18 @@ export interface SinceAnswer {
   readonly found: SinceWhen | null;
 }
 
-type Ended = Pick<Run, "number" | "version" | "state" | "result">;
+type Outcome = Pick<Run, "version" | "state" | "result">;
+type Ended = AgedRun & Outcome;
 
 /** Return whether a run of a version ended as wanted. */
-export function wentWell({ version, state, result }: Ended): boolean {
+export function wentWell({ version, state, result }: Outcome): boolean {
   return version !== null && state === "finished" && (result === "on_true" || result === null);
 }
 
 /** The last run, before one, that went well, as far as it is known. */
-export function lastGoodRun<R extends Ended>(
-  runs: readonly R[],
-  before = Number.POSITIVE_INFINITY,
-): R | null {
-  const good = runs.filter((each) => each.number < before && wentWell(each));
-  return good.reduce<R | null>(
-    (last, each) => (last === null || each.number > last.number ? each : last),
-    null,
-  );
+export function lastGoodRun<R extends Ended>(runs: readonly R[], before?: AgedRun): R | null {
+  const isBefore = (each: R) => before === undefined || newerFirst(before, each) < 0;
+  return runs.filter((each) => isBefore(each) && wentWell(each)).sort(newerFirst)[0] ?? null;
 }
 
 async function asked(runner: string, run: Run, graph: string): Promise<SinceAnswer> {
@@ -158,7 +154,7 @@ async function asked(runner: string, run: Run, graph: string): Promise<SinceAnsw
     editor.get("/api/graphs/{graph_id}/versions", { path }),
   ]);
   const seqOf = (of: Run) => versions.find(({ id }) => id === of.version)?.seq;
-  const good = lastGoodRun(runs, run.number);
+  const good = lastGoodRun(runs, run);
   const [from, to] = [good === null ? undefined : seqOf(good), seqOf(run)];
   if (good === null || from === undefined || to === undefined || from > to) {
     return { good: null, found: null };

@@ -182,29 +182,6 @@ export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/**
- * Return the place in a file that a refusal points at, in words; empty if it points nowhere or its
- * message says it.
- */
-export function errorPlace(error: unknown): string {
-  if (!(error instanceof Refusal)) return "";
-  const words = placeInFile(error);
-  return error.message.includes(words) ? "" : words;
-}
-
-/** Return the JSON pointer in the body of a request at which a refusal points; "" if at none. */
-export function pathRefused(error: unknown): string {
-  return error instanceof Refusal ? (error.details.where?.path ?? "") : "";
-}
-
-function placeInFile(error: Refusal): string {
-  const where = error.details.where;
-  if (where?.line !== undefined) {
-    return `line ${where.line}${where.column === undefined ? "" : `, column ${where.column}`}`;
-  }
-  return where?.path ? `at ${where.path}` : "";
-}
-
 /** Have the page ask the person to confirm who they are, if that is why something was refused. */
 function noteUnconfirmed({ where }: ProblemDetails): void {
   const { item, engines, robots } = { ...where } as Readonly<Record<string, unknown>>;
@@ -254,11 +231,3 @@ export const sessionEnd = {
   /** A person has signed in. */
   clear: (): void => put(false),
 };
-
-/** Return one detail of a refusal, `code` or `graph`; empty if it has none. */
-export function refusedAt(error: unknown, name: "code" | "graph"): string {
-  if (!(error instanceof Refusal)) return "";
-  const where: Readonly<Record<string, unknown>> = { ...error.details.where };
-  const said = where[name];
-  return typeof said === "string" ? said : "";
-}

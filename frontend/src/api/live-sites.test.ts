@@ -3,9 +3,11 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Wire } from "../testing/wire";
 import { runnerAt } from "./client";
 import { sessionEnd } from "./http";
-import { LiveSites } from "./live-sites";
+import { SitesJoiner } from "./live-sites";
 import { openRuns, silentRobots, stateOf, unheardRobots } from "./live-socket";
+import { RunnerSockets } from "./runner-sockets";
 import { noteSite } from "./site-knowledge";
+import { setSites } from "./sites";
 
 const A = { name: "Hall A", url: "http://h:1" };
 const B = { name: "Hall B", url: "http://h:2" };
@@ -39,7 +41,7 @@ const NONE = {
   title: "Not found",
   detail: "There is no such run.",
 };
-let live: LiveSites;
+let live: RunnerSockets;
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -55,8 +57,9 @@ beforeEach(() => {
     if (found !== undefined) return Response.json(found, { status: 201 });
     return url.startsWith(`${A.url}/api/runs/new/`) ? Response.json(NONE, NONE) : Response.json({});
   });
-  live = new LiveSites([A, B]);
-  live.open();
+  live = new RunnerSockets();
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
   wireOf(A.url).say({
     type: "hello",
     engines: [robot("simulator", true), robot("Carl")],
@@ -71,6 +74,7 @@ beforeEach(() => {
 
 afterEach(() => {
   live.close();
+  setSites([]);
   vi.useRealTimers();
   vi.unstubAllGlobals();
 });

@@ -1,90 +1,65 @@
-/** The live sockets of all sites behind one: what is not known of one site hides nothing of the others. */
-import { serverTimeOf, tick } from "../clock/server-clock";
-import { newAid } from "../graph/stop-basics";
+/** Joins the states of the live sockets of all sites: what is not known of one hides nothing of the others. */
+import { pageClock, serverTimeOf, tick } from "../clock/server-clock";
 import { runnerWords } from "./http";
 import {
-  LiveSocket,
+  foreignGraphs,
+  isWaiting,
   type LiveState,
+  openRuns,
   type SiteState,
   type StopRequest,
-  tellEach,
 } from "./live-socket";
 import type { Robot } from "./robots";
+import type { Joiner, Part } from "./runner-sockets";
 import type { Run } from "./runs";
-import { setSites, siteOfId } from "./site-knowledge";
+import { setKnowledge, siteOfId } from "./site-knowledge";
 import { siteRouter } from "./site-requests";
 import { type Site, setSiteRouter } from "./sites";
 
-/** The part of a `LiveSocket` that others use. */
-export type Live = Pick<LiveSocket, keyof LiveSocket>;
+const STEADY = 250; // ms by which the clock of a site may differ from what is shown
+const UNLISTED = " (no longer listed)";
 
-interface Part {
-  readonly site: Site;
-  readonly socket: LiveSocket;
-}
-
-export class LiveSites implements Live {
-  state: LiveState;
-  runSeenAt: ReadonlyMap<string, number> = new Map();
-  robotAnsweredAt: ReadonlyMap<string, number> = new Map();
-  readonly #parts: readonly Part[];
-  readonly #listeners = new Set<() => void>();
-  readonly #seers = new Set<() => void>();
-  /** The robots of sites that have said them once: a name stays taken while its site is silent. */
-  readonly #robots = new Map<Site, ReadonlySet<string>>();
+export class SitesJoiner implements Joiner {
+  #parts: readonly Part[] = [];
+  /** The robots of sites that have said them once, by URL: a name stays taken while its site is silent. */
+  readonly #robots = new Map<string, ReadonlySet<string>>();
   /** Runs and robots of a silent site as they are shown, by what the site said last. */
+  readonly #shifts = new WeakMap<Part["socket"], number>();
   readonly #doubted = new WeakMap<object, { since: number; shown: Run | Robot }>();
 
-  constructor(sites: readonly Site[]) {
-    this.#parts = sites.map((site) => ({ site, socket: new LiveSocket(site.url) }));
-    this.state = this.#joined();
-    for (const { socket } of this.#parts) {
-      socket.subscribe(() => this.#hear());
-      socket.subscribeSeen(() => this.#see());
+  constructor() {
+    setKnowledge((site) => {
+      const socket = this.#partOf(site)?.socket;
+      return {
+        isLive: socket?.state.link === "live",
+        robots: this.#robots.get(site.url) ?? null,
+        hasRun: (id) => socket?.state.runs.has(id) ?? false,
+        shift: socket === undefined ? 0 : this.#steadyShiftOf(socket),
+      };
+    });
+    setSiteRouter(siteRouter);
+  }
+
+  join(parts: readonly Part[]): LiveState {
+    this.#parts = parts;
+    for (const { site, socket } of parts) {
+      const { link, engines } = socket.state;
+      if (link === "live") this.#robots.set(site.url, new Set(engines.map(({ name }) => name)));
     }
-    setSites(sites, (site) => ({
-      isLive: this.#partOf(site)?.socket.state.link === "live",
-      robots: this.#robots.get(site) ?? null,
-      hasRun: (id) => this.#partOf(site)?.socket.state.runs.has(id) ?? false,
-    }));
-    setSiteRouter(siteRouter(sites));
+    return this.#joined();
   }
 
-  open(): void {
-    for (const { socket } of this.#parts) socket.open();
+  joinTimes(parts: readonly Part[]): ReturnType<Joiner["joinTimes"]> {
+    const joined = (name: "runSeenAt" | "robotAnsweredAt") =>
+      new Map(
+        parts.flatMap(({ socket }) =>
+          [...socket[name]].map(([of, at]) => [of, at + shiftOf(socket)] as const),
+        ),
+      );
+    return { runSeenAt: joined("runSeenAt"), robotAnsweredAt: joined("robotAnsweredAt") };
   }
 
-  close(): void {
-    for (const { socket } of this.#parts) socket.close();
-  }
-
-  redial(): void {
-    for (const { socket } of this.#parts) socket.redial();
-  }
-
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-
-  subscribeSeen = (seer: () => void): (() => void) => {
-    this.#seers.add(seer);
-    return () => this.#seers.delete(seer);
-  };
-
-  /** Sends Stop of a run or group to its site, to all while it is not known which one has it. */
-  stop(run: string | "all", id: string = newAid()): void {
-    tellEach(
-      this.#having(run).map(
-        ({ socket }) =>
-          () =>
-            socket.stop(run, id),
-      ),
-    );
-  }
-
-  #having(run: string | "all"): readonly Part[] {
-    if (run === "all") return this.#parts;
+  having(run: string): readonly Part[] {
     const having = this.#parts.filter(({ socket: { state } }) =>
       [...state.runs.values()].some((each) => each.id === run || each.group === run),
     );
@@ -93,32 +68,41 @@ export class LiveSites implements Live {
     return known === undefined ? this.#parts : [known];
   }
 
-  learn(run: Run): void {
-    this.#partOf(siteOfId(run.id))?.socket.learn(run); // of an unknown site it stays unknown to all
+  homeOf(run: string): Part | undefined {
+    return this.#partOf(siteOfId(run));
+  }
+
+  keep(left: readonly Part[], sites: readonly Site[]): readonly Part[] {
+    const isMoved = ({ site, socket: { state } }: Part) =>
+      state.link !== "live" && sites.some(({ name }) => name === site.name);
+    const goesOn = ({ socket: { state } }: Part) =>
+      openRuns(state).length + foreignGraphs(state).length > 0 || state.stops.some(isWaiting);
+    return left
+      .filter((part) => !isMoved(part) && goesOn(part))
+      .map(({ site, socket }) => ({
+        site: { ...site, name: `${site.name.replace(UNLISTED, "")}${UNLISTED}` },
+        socket,
+      }));
+  }
+
+  /** What is drawn by it is not drawn anew with each message: a site with the right time has 0. */
+  #steadyShiftOf(socket: Part["socket"]): number {
+    const [before = 0, now] = [this.#shifts.get(socket), shiftOf(socket)];
+    if (Math.abs(now - before) < STEADY) return before;
+    this.#shifts.set(socket, now);
+    return now;
   }
 
   #partOf(site: Site | undefined): Part | undefined {
-    return this.#parts.find((part) => part.site === site);
-  }
-
-  #hear(): void {
-    for (const { site, socket } of this.#parts) {
-      const { link, engines } = socket.state;
-      if (link === "live") this.#robots.set(site, new Set(engines.map(({ name }) => name)));
-    }
-    this.state = this.#joined();
-    tellEach(this.#listeners);
-  }
-
-  #see(): void {
-    const sockets = this.#parts.map(({ socket }) => socket);
-    this.runSeenAt = new Map(sockets.flatMap((each) => [...each.runSeenAt]));
-    this.robotAnsweredAt = new Map(sockets.flatMap((each) => [...each.robotAnsweredAt]));
-    tellEach(this.#seers);
+    return this.#parts.find((part) => part.site.url === site?.url);
   }
 
   #joined(): LiveState {
-    const sites = this.#parts.map(({ site, socket: { state } }) => ({ site, state }));
+    const sites = this.#parts.map(({ site, socket }) => ({
+      site,
+      state: socket.state,
+      said: (at: number) => new Date(serverTimeOf(at) - shiftOf(socket)).toISOString(),
+    }));
     const links = sites.map(({ state }) => state.link);
     const link = links.find((each) => each === "live") ?? links.find((each) => each !== "down");
     const chosen = sites.find(({ state }) => state.link === (link ?? "down"))?.state;
@@ -139,25 +123,25 @@ export class LiveSites implements Live {
       stops: joinedStops(sites),
       asked: sites.flatMap(({ state }) => state.asked),
       queue: joinedQueue(sites),
-      sites,
+      sites: sites.map(({ site, state }) => ({ site, state })),
     };
   }
 
   /** A robot of a silent site does not answer, as far as this page knows. */
-  #robotOf(robot: Robot, { site, state }: SiteState): Robot {
+  #robotOf(robot: Robot, { site, state, said }: Doubtful): Robot {
     if (state.link === "live" || robot.simulated) return robot;
     return this.#doubt(robot, state.since, () => ({
       ...robot,
       state: "gone",
-      since: new Date(serverTimeOf(state.since)).toISOString(),
+      since: said(state.since),
       why: `${runnerWords(site.name)} does not answer.`,
     }));
   }
 
   /** Returns an open run of a silent site as *unknown*: nobody knows what becomes of it. */
-  #runOf(run: Run, { state }: SiteState): Run {
+  #runOf(run: Run, { state, said }: Doubtful): Run {
     if (state.link === "live" || run.ended_at !== null) return run;
-    const since = new Date(serverTimeOf(state.since)).toISOString();
+    const since = said(state.since);
     return this.#doubt(run, state.since, () => ({
       ...run,
       state: "unknown",
@@ -174,6 +158,15 @@ export class LiveSites implements Live {
     return shown;
   }
 }
+
+/** `said`: the time of a tick by the site's clock, as it would say it. */
+interface Doubtful extends SiteState {
+  readonly said: (at: number) => string;
+}
+
+/** Nothing is known of the clock of a site that has not said its time. */
+const shiftOf = ({ clock }: Part["socket"]): number =>
+  clock.isMeasured ? pageClock.now() - clock.now() : 0;
 
 /** A Stop that several sites have got is one: it is as far as the site that is least far. */
 function joinedStops(sites: readonly SiteState[]): StopRequest[] {

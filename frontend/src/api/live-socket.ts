@@ -1,5 +1,5 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
-import { hearStamp, serverNow, tick } from "../clock/server-clock";
+import { pageClock, ServerOffset, tick } from "../clock/server-clock";
 import { isEqual, newAid } from "../graph/stop-basics";
 import { runnerOnlyAt } from "./client";
 import type { AskedConfirmation } from "./confirmations";
@@ -10,7 +10,7 @@ import type { HeldGraph, Robot } from "./robots";
 import { postStop } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
-import { isFurtherSite, type Site, siteOfId } from "./sites";
+import { isFurtherSite, newerFirst, type Site, siteOfId } from "./sites";
 import type { UnreachableReason } from "./unreached";
 
 export type LiveLink = "connecting" | "live" | "down";
@@ -103,8 +103,13 @@ export class LiveSocket {
   /** Reason why the last socket did not open. */
   #unreached: UnreachableReason | null = null;
 
-  constructor(runner: string) {
+  /** The clock of the runner: it may be another one than that of the page. */
+  readonly clock: ServerOffset;
+
+  /** `isFirst`: of the runner beside the editor, by whose clock the page goes. */
+  constructor(runner: string, isFirst = true) {
     this.#runner = runner;
+    this.clock = isFirst ? pageClock : new ServerOffset(pageClock.now());
   }
 
   open(): void {
@@ -288,7 +293,7 @@ export class LiveSocket {
         // What this page believed to be open and the runner no longer names has ended unseen.
         const unseen = openRuns(this.state)
           .filter(({ id }) => !open.has(id))
-          .map(withUnseenEnd);
+          .map((run) => withUnseenEnd(run, this.clock.now() + tick()));
         for (const run of unseen) runs.set(run.id, run);
         for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
         this.#joinStops(message.runs);
@@ -325,7 +330,7 @@ export class LiveSocket {
         this.#sayHere(message.number);
         break;
       case "beat": {
-        hearStamp(message.at);
+        this.clock.hear(Date.parse(message.at), tick());
         const seen = times(message.seen);
         const heard = times(message.heard);
         if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
@@ -372,10 +377,9 @@ export class LiveSocket {
 
   /** One that nobody has answered stays, and is sent on, until it is asked for anew. */
   #putStop(stop: StopRequest): void {
-    const waits = (each: StopRequest) => each.state === "asked" || each.state === "unheard";
-    const others = this.state.stops.filter((each) => !(waits(each) && each.run === stop.run));
-    const answered = others.filter((each) => !waits(each)).slice(1 - STOPS_KEPT);
-    const kept = others.filter((each) => waits(each) || answered.includes(each));
+    const others = this.state.stops.filter((each) => !(isWaiting(each) && each.run === stop.run));
+    const answered = others.filter((each) => !isWaiting(each)).slice(1 - STOPS_KEPT);
+    const kept = others.filter((each) => isWaiting(each) || answered.includes(each));
     this.#set({ stops: [...kept, stop] });
   }
 
@@ -431,6 +435,10 @@ export class LiveSocket {
   }
 }
 
+/** Return whether nobody has answered a Stop. */
+export const isWaiting = ({ state }: StopRequest): boolean =>
+  state === "asked" || state === "unheard";
+
 /** Calls all listeners. One that fails keeps no other one, and nothing that comes after, from its turn. */
 export function tellEach(listeners: Iterable<() => void>): void {
   for (const listener of listeners) {
@@ -443,9 +451,9 @@ export function tellEach(listeners: Iterable<() => void>): void {
 }
 
 /** Return a run whose end nobody has seen yet, as it is shown until the runner says how it ended. */
-function withUnseenEnd(run: Run): Run {
-  const now = new Date(serverNow()).toISOString();
-  return { ...run, state: "unknown", unknown_since: run.unknown_since ?? now };
+function withUnseenEnd(run: Run, now: number): Run {
+  const since = run.unknown_since ?? new Date(now).toISOString();
+  return { ...run, state: "unknown", unknown_since: since };
 }
 
 /** Throws an error if a message lacks what each robot and each run has. */
@@ -509,15 +517,9 @@ export function isUrgentChange(before: Run | undefined, now: Run): boolean {
   return URGENT.some((field) => !isEqual(before[field], now[field]));
 }
 
-/** Return which of two runs is newer, for `sort`. Each runner counts its own. */
-function byAge(now: LiveState): (a: Run, b: Run) => number {
-  if (now.sites === undefined) return (a, b) => b.number - a.number;
-  return (a, b) => Date.parse(b.requested_at) - Date.parse(a.requested_at);
-}
-
 /** The runs that go on, newest first, as far as this page knows. */
 export function openRuns(now: LiveState): Run[] {
-  return [...now.runs.values()].filter((run) => run.ended_at === null).sort(byAge(now));
+  return [...now.runs.values()].filter((run) => run.ended_at === null).sort(newerFirst);
 }
 
 /**
@@ -545,9 +547,8 @@ export function silentSites(now: LiveState): SiteState[] {
 /** The newest run of a graph that this page has heard of live. */
 export function newestRun(now: LiveState, graph: string): Run | null {
   let newest: Run | null = null;
-  const order = byAge(now);
   for (const run of now.runs.values()) {
-    if (run.graph === graph && (newest === null || order(run, newest) < 0)) newest = run;
+    if (run.graph === graph && (newest === null || newerFirst(run, newest) < 0)) newest = run;
   }
   return newest;
 }

@@ -3,36 +3,34 @@
  * and to no component, so that no error while something is drawn takes the way of Stop.
  */
 
-import { useMemo, useSyncExternalStore } from "react";
-import { tick } from "../clock/server-clock";
+import { useSyncExternalStore } from "react";
 import { editor } from "./client";
 import { errorText } from "./http";
-import type { Live } from "./live-sites";
-import { LiveSocket, type LiveState, stateOf } from "./live-socket";
+import { type LiveState, stateOf } from "./live-socket";
+import { NOTHING, RunnerSockets } from "./runner-sockets";
+import type { Site } from "./sites";
 
 export interface PageLinkState {
-  live: Live | null;
-  /** The runner's address, once the editor has told it. */
+  live: RunnerSockets | null;
+  /** The address that stands for all runners, once the page can send them requests. */
   runner: string | undefined;
-  /**
-   * The reason why the page does not know the runner's address; "" if it does, or has not asked
-   * yet.
-   */
-  lost: string;
   /** Set if a person is signed in, as far as this page knows: only then STOP is shown. */
   signedIn: boolean;
 }
 
-const AGAIN = 5_000; // ms between two questions for the runner's address, at most
+const AGAIN = 5_000; // ms between two tries to hear where the runners are, at most
+const LOOK = 30_000; // ms after which a page that is looked at asks again: there may be others by now
 
 class PageLink {
-  #state: PageLinkState = { live: null, runner: undefined, lost: "", signedIn: false };
+  #state: PageLinkState = { live: null, runner: undefined, signedIn: false };
   readonly #listeners = new Set<() => void>();
   /** Identity of the open socket: the runner knows it by the session it was opened with. */
   #who = "";
   #visit = 0;
-  #asking = false;
-  #makeLive: (runner: string) => Live = (runner) => new LiveSocket(runner);
+  #sites: readonly Site[] = [];
+  /** What is asked now, and whether it has to be asked once more. */
+  #asking: "no" | "yes" | "again" = "no";
+  #next: ReturnType<typeof setTimeout> | undefined;
 
   now = (): PageLinkState => this.#state;
 
@@ -49,11 +47,14 @@ class PageLink {
     const known = this.#state.signedIn && this.#who === who && visit <= this.#visit;
     this.#who = who;
     this.#visit = Math.max(visit, this.#visit);
-    if (!this.#state.signedIn) this.#set({ signedIn: true });
     if (this.#state.live !== null) {
       if (!known) this.#state.live.redial();
-    } else if (this.#state.runner !== undefined) this.#open(this.#state.runner);
-    else void this.#find();
+      return;
+    }
+    const live = new RunnerSockets(this.look);
+    if (this.#sites.length > 0) live.setSites(this.#sites);
+    this.#set({ live, signedIn: true });
+    this.look();
   }
 
   /** Says that nobody is signed in any more. */
@@ -63,32 +64,51 @@ class PageLink {
     this.#set({ live: null, signedIn: false });
   }
 
-  #open(runner: string): void {
-    const live = this.#makeLive(runner);
-    live.open();
-    this.#set({ live, runner, lost: "" });
-  }
+  /** Asks where the runners are, until the editor has told it: without that there is no way for Stop. */
+  look = (): void => {
+    clearTimeout(this.#next);
+    if (this.#asking !== "no") this.#asking = "again";
+    else void this.#ask();
+  };
 
-  /** Asks until the editor has told where the runner is: without that there is no way for Stop. */
-  async #find(): Promise<void> {
-    if (this.#asking) return;
-    this.#asking = true;
+  async #ask(): Promise<void> {
     for (let wait = 500; this.#state.signedIn; wait = Math.min(AGAIN, 2 * wait)) {
+      this.#asking = "yes";
       try {
-        const { runner_url, runners = [] } = await editor.get("/api/config", {});
-        if (runners.length > 1) {
-          const { LiveSites } = await import("./live-sites");
-          this.#makeLive = () => new LiveSites(runners);
-        }
-        if (this.#state.signedIn) this.#open(runner_url);
-        else this.#set({ runner: runner_url });
+        await this.#find();
+        if ((this.#asking as string) === "again") continue;
         break;
       } catch (error) {
-        this.#set({ lost: errorText(error) });
+        this.#state.live?.lose(errorText(error));
       }
       await new Promise((done) => setTimeout(done, wait));
     }
-    this.#asking = false;
+    this.#asking = "no";
+    if (this.#state.signedIn) this.#again();
+  }
+
+  #again(): void {
+    this.#next = setTimeout(() => (document.hidden ? this.#again() : this.look()), LOOK);
+  }
+
+  async #find(): Promise<void> {
+    const { runner_url: url, runners } = await editor.get("/api/config", {}).catch((error) => {
+      throw new Error(`The runner’s address is not known. ${errorText(error)}`);
+    });
+    this.#sites = runners ?? [{ name: "", url }];
+    const { live } = this.#state;
+    live?.setSites(this.#sites); // STOP waits for nothing that comes later
+    if (runners !== undefined && live?.isJoined === false) {
+      const joiner = await import("./live-sites").then(
+        ({ SitesJoiner }) => new SitesJoiner(),
+        (error) => {
+          const why = "A part of this page did not load. STOP goes to each runner.";
+          throw new Error(`${why} ${errorText(error)}`);
+        },
+      );
+      live.joinBy(joiner);
+    }
+    if (this.#state.runner !== url) this.#set({ runner: url });
   }
 
   #set(part: Partial<PageLinkState>): void {
@@ -99,32 +119,13 @@ class PageLink {
 
 export const pageLink = new PageLink();
 
-const NOTHING: LiveState = {
-  asked: [],
-  link: "connecting",
-  since: tick(),
-  engines: [],
-  runs: new Map(),
-  stops: [],
-};
 const never = () => () => {};
-
-/** Before the runner's address is known; with the reason, once there is one. */
-const unknown = (lost: string): LiveState =>
-  lost === ""
-    ? NOTHING
-    : {
-        ...NOTHING,
-        link: "down",
-        unreached: { kind: "silent", why: `The runner’s address is not known. ${lost}` },
-      };
 
 /** Return the state of the live link. `run`: the id of a run, for the state of its site instead of that of all sites. */
 export function useLive(run?: string): PageLinkState & { now: LiveState } {
   const hold = useSyncExternalStore(pageLink.subscribe, pageLink.now);
-  const { live, lost } = hold;
-  const nothing = useMemo(() => unknown(lost), [lost]);
-  const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.state ?? nothing);
+  const { live } = hold;
+  const now = useSyncExternalStore(live?.subscribe ?? never, () => live?.state ?? NOTHING);
   return { ...hold, now: stateOf(now, run) };
 }
 

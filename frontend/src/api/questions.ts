@@ -5,30 +5,42 @@ import { sendPress } from "./presses";
 import type { Run } from "./run-stop";
 import type { Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
-import { runnerOfRun } from "./sites";
+import { runnerOfRun } from "./site-places";
+import { siteOfId } from "./sites";
+import { useUnsaidSites } from "./unsaid-sites";
 
 export type Question = RunnerApi["QuestionShown"];
 
 /** The words of a person: an answer, or the reason why they cannot give one. */
 export type Said = { readonly value: boolean | number | string } | { readonly cannot: string };
 
+type MayAnswer = Pick<RunnerApi["WaitingQuestion"], "may" | "why">;
+
+const ASK: MayAnswer = { may: true, why: "" };
+const QUESTIONS = "/api/questions";
+
 /**
- * Query whether this person may answer each question that waits, by its id; null if the runner does not say. `open`:
- * the ids of those that the page knows; the query is asked again when they change.
+ * Query whether this person may answer a question that waits, by its id; undefined until the runner has said it. Where
+ * its runner does not say it, the answer itself is allowed or refused. `open`: the questions that the page knows, each
+ * with the id of its run; the query is asked again when they change.
  */
 export function useMayAnswer(
   runner: string | undefined,
-  open: readonly string[],
-): ReadonlyMap<string, RunnerApi["WaitingQuestion"]> | null {
+  open: readonly { readonly id: string; readonly run: string }[],
+): (id: string) => MayAnswer | undefined {
+  const unsaid = useUnsaidSites(`get ${QUESTIONS}`);
   const { data, isError } = useQuery({
-    queryKey: ["questions", runner, open.join(" ")],
-    queryFn: ({ signal }) => runnerAt(runner).get("/api/questions", { signal }),
+    queryKey: ["questions", runner, open.map(({ id }) => id).join(" ")],
+    queryFn: ({ signal }) => runnerAt(runner).get(QUESTIONS, { signal }),
     enabled: runner !== undefined && open.length > 0,
     staleTime: 5_000,
     refetchInterval: 10_000, // batons and rights change
   });
-  if (isError) return null;
-  return new Map((data?.questions ?? []).map((each) => [each.question.id, each]));
+  return (id) => {
+    const at = siteOfId(open.find((each) => each.id === id)?.run ?? "");
+    if (isError || unsaid.some(({ site }) => site.url === at?.url)) return ASK;
+    return data?.questions.find(({ question }) => question.id === id);
+  };
 }
 
 /** Answer a question. The first answer that is stored counts; robots may begin to move. */

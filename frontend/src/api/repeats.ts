@@ -4,7 +4,7 @@ import { serverNow } from "../clock/server-clock";
 import { runnerAt } from "./client";
 import { type Run, type StartOrder, startBody, type Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
-import { runnerOfRun } from "./sites";
+import { runnerOfRun } from "./site-places";
 
 export type Repeat = RunnerApi["RepeatShown"];
 export type RepeatSummary = RunnerApi["RepeatSummary"];

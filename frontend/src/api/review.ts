@@ -5,7 +5,7 @@ import { fetchAnswer, type RequestOptions } from "./http";
 import { getRun } from "./run-stop";
 import type { Inside, Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
-import { runnerOfRun } from "./sites";
+import { runnerOfRun } from "./site-places";
 
 export type RunMarks = RunnerApi["RunMarks"];
 /** A run of the list, with what people noted about it and why it did not end well. */

@@ -3,7 +3,7 @@ import { useQueries, useQuery } from "@tanstack/react-query";
 import { runnerAt, runnerOnlyAt } from "./client";
 import { fetchText } from "./http";
 import type { RunnerApi } from "./schema/runner";
-import { runnerOfRobot, takenElsewhere } from "./sites";
+import { runnerOfRobot, takenElsewhere } from "./site-places";
 
 export const SIMULATOR = "simulator";
 

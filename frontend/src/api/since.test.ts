@@ -8,7 +8,7 @@ const run = (number: number, part: Partial<Run> = {}): Run =>
 
 test("the last run before that finished well counts, whatever the order of the list", () => {
   const runs = [run(3), run(1), run(5), run(4, { result: "on_error" }), run(2)];
-  expect(lastGoodRun(runs, 5)?.number).toBe(3);
+  expect(lastGoodRun(runs, run(5))?.number).toBe(3);
 });
 
 test("a robot that tells no result is taken at its word that it finished", () => {

@@ -2,28 +2,34 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { runnerAt } from "./client";
 import { registerRobot } from "./robots";
-import { setSites } from "./site-knowledge";
+import { setKnowledge } from "./site-knowledge";
 import { siteRouter } from "./site-requests";
-import { type Site, setSiteRouter } from "./sites";
+import { newerFirst, type Site, setSiteRouter, setSites } from "./sites";
+import { unsaidSites } from "./unsaid-sites";
 
 const A: Site = { name: "Hall A", url: "http://lab:8001" };
 const B: Site = { name: "Hall B", url: "http://lab:8011" };
 const robots = new Map<Site, readonly string[] | null>();
 const live = new Set<Site>();
+/** Milliseconds by which the clock of a site is behind that of the page. */
+const shifts = new Map<Site, number>();
 /** What each site answers, by method and path; an error stands for a site that does not answer. */
 let answers: Record<string, unknown>;
 let asked: string[];
 
 beforeEach(() => {
   robots.clear();
+  shifts.clear();
   robots.set(A, ["simulator", "Carl"]).set(B, ["simulator", "Dora"]);
   for (const site of [A, B]) live.add(site);
-  setSites([A, B], (site) => ({
+  setSites([A, B]);
+  setKnowledge((site) => ({
     isLive: live.has(site),
     robots: robots.get(site) === null ? null : new Set(robots.get(site)),
     hasRun: (id) => id === (site === B ? "ofB" : "ofA"),
+    shift: shifts.get(site) ?? 0,
   }));
-  setSiteRouter(siteRouter([A, B]));
+  setSiteRouter(siteRouter);
   answers = {};
   asked = [];
   vi.stubGlobal("fetch", async (url: string, { method }: RequestInit) => {
@@ -34,12 +40,14 @@ beforeEach(() => {
       .sort(([a], [b]) => b.length - a.length);
     if (found === undefined) return new Response("{}", { status: 404 });
     if (found[1] instanceof Error) throw found[1];
+    if (found[1] instanceof Response) return found[1].clone();
     return Response.json(found[1]);
   });
 });
 
 afterEach(() => {
   setSiteRouter(undefined);
+  setSites([]);
   vi.unstubAllGlobals();
 });
 
@@ -124,6 +132,50 @@ test("a site that does not answer hides no run of the others", async () => {
   answers = { "GET 8001": [{ id: "a", requested_at: "2026-11-30T10:00:00Z" }] };
   answers["GET 8011"] = new TypeError("refused");
   expect(await runner.get("/api/runs", { query: { limit: 2 } })).toHaveLength(1);
+});
+
+test("a site that answers with an error or with garbage is named, and hides nothing of the others", async () => {
+  const waiting = { questions: [{ question: { id: "q" } }] };
+  const runs = [{ id: "a", number: 1, requested_at: "2026-11-30T10:00:00Z" }];
+  answers = { "GET 8001/api/questions": waiting, "GET 8001/api/runs": runs };
+  const lacking = (route: string) => unsaidSites(route).map(({ site, why }) => [site.name, why]);
+  const cannot = ["Hall B", "What it says cannot be read."];
+  for (const [said, named] of [
+    [new Response("broken", { status: 500 }), ["Hall B", "The server answered 500."]],
+    [new Response("<html>", { status: 200 }), ["Hall B", expect.stringContaining("JSON")]],
+    [{}, cannot],
+    ["text", cannot],
+    [{ questions: {} }, cannot],
+    [{ questions: [null] }, cannot],
+  ] as const) {
+    answers["GET 8011"] = said;
+    expect(await runner.get("/api/questions", {})).toEqual(waiting);
+    expect(await runner.get("/api/runs", { query: { limit: 9 } })).toEqual(runs);
+    for (const route of ["questions", "runs"])
+      expect(lacking(`get /api/${route}`)).toEqual([named]);
+  }
+  answers["GET 8001"] = new Response("broken", { status: 500 });
+  answers = { ...answers, "GET 8011": { questions: [] }, "GET 8001/api/questions": {} };
+  expect(await runner.get("/api/questions", {})).toEqual({ questions: [] });
+  expect(lacking("get /api/questions")).toEqual([["Hall A", "What it says cannot be read."]]);
+  answers["GET 8001/api/questions"] = waiting;
+  await runner.get("/api/questions", {});
+  expect(lacking("get /api/questions")).toEqual([]);
+});
+
+test("runs of sites with wrong clocks are in the order of time", async () => {
+  const at = (id: string, number: number, second: number) => ({
+    ...{ id, number },
+    requested_at: new Date(Date.UTC(2026, 10, 30, 10, 0, second)).toISOString(),
+  });
+  shifts.set(B, -60_000); // it is a minute ahead
+  const [a, b] = [at("ofA", 7, 40), at("ofB", 900, 90)]; // the second is ten seconds older
+  answers = { "GET 8001": [a], "GET 8011": [b] };
+  const listed = await runner.get("/api/runs", { query: { limit: 2 } });
+  expect(listed.map(({ id }) => id)).toEqual(["ofA", "ofB"]);
+  expect([b, a].sort(newerFirst).map(({ id }) => id)).toEqual(["ofA", "ofB"]);
+  setSites([]); // one runner: its own count
+  expect([a, b].sort(newerFirst).map(({ id }) => id)).toEqual(["ofB", "ofA"]);
 });
 
 test("a revocation is told to both, and who was not reached is named", async () => {

@@ -1,15 +1,23 @@
 /** Chooses the site of each request, and joins the answers of several sites. */
 import { isolated } from "../words/isolated";
-import { Refusal } from "./http";
+import { errorText, Refusal } from "./http";
 import {
-  allSites,
   mutedSites,
   noteSite,
+  shiftOf,
   siteOfId,
   sitesOfRobot,
   takenElsewhere,
 } from "./site-knowledge";
-import type { AskSite, Site, SiteRouter, UnsentRequest } from "./sites";
+import {
+  type AgedRun,
+  type AskSite,
+  allSites,
+  type Site,
+  type SiteRouter,
+  type UnsentRequest,
+} from "./sites";
+import { noteUnsaid, type UnsaidSite } from "./unsaid-sites";
 
 const SIMULATOR = "simulator"; // each runner has one
 
@@ -27,20 +35,20 @@ const TOLD = new Set([
   "delete /api/releases/{version}",
 ]);
 
-/** Requests whose answers are joined. */
-const JOINED = new Set([
-  "get /api/labels",
-  "get /api/questions",
-  "get /api/queue",
-  "get /api/repeats",
-  "get /api/rights",
-  "get /api/candidates/now",
-  "get /api/approvals",
-  "get /api/approvals/asked",
-  "get /api/expectations",
-  "post /api/expectations/check",
-  "get /api/view-links",
-]);
+/** Requests whose answers are joined: the names of the lists in the answer, none where it is a list itself. */
+const JOINED: Readonly<Record<string, readonly string[]>> = {
+  "get /api/labels": [],
+  "get /api/questions": ["questions"],
+  "get /api/queue": ["entries", "robots"],
+  "get /api/repeats": [],
+  "get /api/rights": ["robots", "people"],
+  "get /api/candidates/now": ["engines"],
+  "get /api/approvals": [],
+  "get /api/approvals/asked": [],
+  "get /api/expectations": [],
+  "post /api/expectations/check": [],
+  "get /api/view-links": [],
+};
 
 /** Requests that name robots in their body. */
 const OF_ROBOTS = new Set([
@@ -58,8 +66,9 @@ const askSites: SiteRouter["ask"] = async (route, sent, ask) => {
   if (route === "delete /api/session") return tellAll(allSites(), ended(ask));
   if (TOLD.has(route)) return tellAll(allSites(), ask);
   if (route === "post /api/robots/{name}/stop") return stopRobot(String(sent.path?.name), ask);
-  if (route === "get /api/runs") return listRuns(sent, ask);
-  if (JOINED.has(route)) return joined(await answersOf(ask));
+  if (route === "get /api/runs") return listRuns(route, sent, ask);
+  const lists = JOINED[route];
+  if (lists !== undefined) return joined(await answersOf(route, lists, ask));
   if (route === "get /api/starts/{request_id}")
     return foundStart(String(sent.path?.request_id), askNoting(ask));
   if (route === "post /api/preflight" && !isLed(sent.body)) return preflights(sent.body, ask);
@@ -138,17 +147,33 @@ interface Answer {
   readonly value: unknown;
 }
 
+/** Return an answer that has these lists. Throws an error for another one: a site that is none of ours hides no other. */
+function readable(value: unknown, lists: readonly string[]): unknown {
+  const parts = lists.length === 0 ? [value] : lists.map((name) => isObject(value) && value[name]);
+  if (parts.every((part) => Array.isArray(part) && part.every((each) => each !== null)))
+    return value;
+  throw new Error("What it says cannot be read.");
+}
+
 /** Returns the answers of the sites that answer. Throws the error of the first site if none does. */
 async function answersOf(
+  route: string,
+  lists: readonly string[],
   ask: AskSite,
   otherFor: (site: Site) => Parameters<AskSite>[1] = () => undefined,
 ): Promise<Answer[]> {
   const sites = allSites();
-  const heard = await Promise.allSettled(sites.map((site) => ask(site, otherFor(site))));
-  const answers = heard.flatMap((each, i) => {
-    const site = sites[i];
-    return each.status === "fulfilled" && site ? [{ site, value: each.value }] : [];
+  const heard = await Promise.allSettled(
+    sites.map((site) => ask(site, otherFor(site)).then((value) => readable(value, lists))),
+  );
+  const answers: Answer[] = [];
+  const unsaid: UnsaidSite[] = [];
+  sites.forEach((site, i) => {
+    const each = heard[i];
+    if (each?.status === "fulfilled") answers.push({ site, value: each.value });
+    else unsaid.push({ site, why: errorText(each?.reason) });
   });
+  noteUnsaid(route, unsaid);
   if (answers.length === 0) throw (heard[0] as PromiseRejectedResult).reason;
   return answers;
 }
@@ -295,35 +320,30 @@ async function preflights(body: unknown, ask: AskSite): Promise<unknown> {
   return engines.map((engine) => found.get(engine));
 }
 
-interface ListedRun {
-  readonly id: string;
-  readonly requested_at: string;
-}
-
 /** The last run of each site that the pages up to a run have, by that run's id. */
 const cursors = new Map<string, ReadonlyMap<Site, string>>();
 
 /** The newest runs of all sites by time; each site keeps its own order. */
-async function listRuns({ query }: UnsentRequest, ask: AskSite): Promise<unknown> {
+async function listRuns(route: string, { query }: UnsentRequest, ask: AskSite): Promise<unknown> {
   const given = new URLSearchParams(asRecord(query) as Record<string, string>);
   for (const [key, value] of [...given])
     if (value === "undefined" || value === "null") given.delete(key);
   const limit = Number(given.get("limit") ?? Number.POSITIVE_INFINITY);
   const after = cursors.get(given.get("before") ?? "") ?? new Map<Site, string>();
-  const answers = await answersOf(ask, (site) => {
+  const answers = await answersOf(route, [], ask, (site) => {
     const own = new URLSearchParams(given);
     const before = after.get(site);
     if (before === undefined) own.delete("before");
     else own.set("before", before);
     return { query: own };
   });
-  const left = answers.map(({ site, value }) => ({ site, runs: [...(value as ListedRun[])] }));
+  const left = answers.map(({ site, value }) => ({ site, runs: [...(value as AgedRun[])] }));
   const last = new Map(after);
-  const found: ListedRun[] = [];
+  const found: AgedRun[] = [];
   while (found.length < limit) {
     const heads = left.filter(({ runs }) => runs.length > 0);
-    const time = ({ runs }: (typeof left)[number]) => Date.parse(runs[0]?.requested_at ?? "");
-    const next = heads.sort((a, b) => time(b) - time(a))[0];
+    const time = ({ site, runs: [run] }: (typeof left)[number]) => run && momentOf(run, site);
+    const next = heads.sort((a, b) => (time(b) ?? 0) - (time(a) ?? 0))[0];
     const run = next?.runs.shift();
     if (next === undefined || run === undefined) break;
     noteSite(run.id, next.site);
@@ -335,7 +355,16 @@ async function listRuns({ query }: UnsentRequest, ask: AskSite): Promise<unknown
   return found;
 }
 
-/** Return what chooses the site of each request. */
-export function siteRouter(sites: readonly Site[]): SiteRouter {
-  return { sites, ask: askSites, siteOfId, sitesOfRobot, takenElsewhere };
+function momentOf({ id, requested_at }: AgedRun, site = siteOfId(id)): number {
+  return Date.parse(requested_at) + shiftOf(site);
 }
+
+/** Chooses the site of each request. */
+export const siteRouter: SiteRouter = {
+  ask: askSites,
+  siteOfId,
+  sitesOfRobot,
+  takenElsewhere,
+  shiftOf,
+  newerFirst: (a, b) => momentOf(b) - momentOf(a),
+};

@@ -23,9 +23,15 @@ export interface UnsentRequest {
   readonly body?: unknown;
 }
 
+/** A run, as far as its age is concerned. */
+export interface AgedRun {
+  readonly id: string;
+  readonly number: number;
+  readonly requested_at: string;
+}
+
 /** Knows which site has what. */
 export interface SiteRouter {
-  readonly sites: readonly Site[];
   /** Sends a request to the sites that it is meant for. `route`: method and path, as OpenAPI has it. */
   ask(route: string, sent: UnsentRequest, ask: AskSite): Promise<unknown>;
   /** Returns the site of a run, a piece of one or something else with an id, as far as the page knows it. */
@@ -34,47 +40,55 @@ export interface SiteRouter {
   sitesOfRobot(robot: string): readonly Site[];
   /** Returns why a robot cannot get this name at a site; "" if it can. */
   takenElsewhere(robot: string, url: string): string;
+  /** Returns the milliseconds from a time by the clock of a site to the same moment by the page's. */
+  shiftOf(site: Site | undefined): number;
+  /** Compares the moments of two runs, each by the clock of its runner. */
+  newerFirst(a: AgedRun, b: AgedRun): number;
 }
 
+let sites: readonly Site[] = [];
 let router: SiteRouter | undefined;
 
-/** Set what chooses the site of each request; undefined with one runner. */
+/** Set the sites, none with one runner. Stop needs no router. */
+export function setSites(found: readonly Site[]): void {
+  sites = found;
+}
+
+export const allSites = (): readonly Site[] => sites;
+
+/** Set what chooses the site of each request, once it is there. */
 export function setSiteRouter(found: SiteRouter | undefined): void {
   router = found;
 }
 
+/** Return the router; undefined with one runner. */
+export const routing = (): SiteRouter | undefined => (sites.length > 0 ? router : undefined);
+
 /** Return the router for an address that stands for all sites; undefined for the address of one runner. */
 export function routerOf(address: string): SiteRouter | undefined {
-  return router?.sites[0]?.url === address ? router : undefined;
+  return sites[0]?.url === address ? router : undefined;
 }
 
 /** Return the site of a URL. */
 export function siteOfUrl(url: string): Site | undefined {
-  return router?.sites.find((site) => url.startsWith(`${site.url}/`));
+  return sites.find((site) => url.startsWith(`${site.url}/`));
 }
 
 /** Return whether a URL is of another site than the first. */
 export function isFurtherSite(url: string): boolean {
   const site = siteOfUrl(url);
-  return site !== undefined && site !== router?.sites[0];
+  return site !== undefined && site !== sites[0];
 }
 
 /** Return the site of a run or of something else with an id; undefined with one runner. */
 export function siteOfId(id: string): Site | undefined {
-  return router?.siteOfId(id);
+  return routing()?.siteOfId(id);
 }
 
-/** Return the runner that has a run or a repeat, for an address that stands for all. */
-export function runnerOfRun(address: string, run: string): string {
-  return routerOf(address)?.siteOfId(run)?.url ?? address;
-}
-
-/** Return the runner that has a robot, for an address that stands for all. */
-export function runnerOfRobot(address: string, robot: string): string {
-  return routerOf(address)?.sitesOfRobot(robot)[0]?.url ?? address;
-}
-
-/** Return why a robot cannot get this name at a site; "" if it can, and with one runner. */
-export function takenElsewhere(robot: string, url: string): string {
-  return router?.takenElsewhere(robot, url) ?? "";
+/**
+ * Compare two runs for `sort`, the newer one first. A runner counts its own runs, so that the numbers of several
+ * say nothing about each other: there the moments count.
+ */
+export function newerFirst(a: AgedRun, b: AgedRun): number {
+  return routing()?.newerFirst(a, b) ?? b.number - a.number;
 }

@@ -21,7 +21,13 @@ export async function findUnreachableReason(runner: string): Promise<Unreachable
       why: `This page is encrypted and the runner at ${runner} is not, so the browser blocks the connection. A proxy has to serve both: start the server with --public-url ${pageUrl()}/ and forward everything below runner/ to the runner’s port.`,
     };
   }
+  const refused = refusedByPolicy(runner);
   const answer = await asked(`${runner}/api/reach`);
+  if (await refused())
+    return {
+      kind: "strange",
+      why: `This page was loaded before the runner at ${runner} was named, so the browser lets it not connect there: reload the page.`,
+    };
   if (answer === null)
     return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
   if (answer.status === 401) return unknownTo(runner);
@@ -31,6 +37,20 @@ export async function findUnreachableReason(runner: string): Promise<Unreachable
   return {
     kind: "mute",
     why: "The runner answers, but a live connection to it cannot be opened: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
+  };
+}
+
+/** The policy of a page names the runners of the time at which it was loaded. Returns what tells whether it has refused. */
+function refusedByPolicy(runner: string): () => Promise<boolean> {
+  let is = false;
+  const listen = ({ blockedURI }: SecurityPolicyViolationEvent) => {
+    is ||= blockedURI.startsWith(runner);
+  };
+  globalThis.document?.addEventListener("securitypolicyviolation", listen);
+  return async () => {
+    await new Promise((done) => setTimeout(done)); // the event may come after the refusal
+    globalThis.document?.removeEventListener("securitypolicyviolation", listen);
+    return is;
   };
 }
 

@@ -2,7 +2,7 @@
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { editor, renewing, runnerAt } from "./client";
 import type { EditorApi } from "./schema/editor";
-import { runnerOfRun } from "./sites";
+import { runnerOfRun } from "./site-places";
 
 export type ViewLink = EditorApi["ViewLink"];
 

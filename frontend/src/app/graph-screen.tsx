@@ -89,10 +89,10 @@ interface RunHere {
 
 function useRunHere(id: string): RunHere {
   const { now, runner } = useLive();
-  const [chosen, setChosen] = useState({ run: "", before: 0 });
+  const [chosen, setChosen] = useState({ run: "", before: "" });
   const newest = newestRun(now, id);
   const going = openRuns(now).filter((run) => run.graph === id);
-  const wanted = chosen.before === newest?.number ? now.runs.get(chosen.run) : undefined;
+  const wanted = chosen.before === newest?.id ? now.runs.get(chosen.run) : undefined;
   const live = wanted ?? going[0] ?? newest;
   const last = useLastRun(runner, id).data;
   const run = live ?? last;
@@ -100,7 +100,7 @@ function useRunHere(id: string): RunHere {
   const label = versionName(versions, run?.version ?? null) || run?.digest.slice(0, 7) || "";
   return {
     going,
-    choose: (chosen) => setChosen({ run: chosen, before: newest?.number ?? 0 }),
+    choose: (chosen) => setChosen({ run: chosen, before: newest?.id ?? "" }),
     live,
     run,
     label,

@@ -29,6 +29,11 @@ export class ServerOffset {
     return this.#now;
   }
 
+  /** Whether the server has said its time exactly. */
+  get isMeasured(): boolean {
+    return this.#least.length > 0;
+  }
+
   /** Take in a message that was stamped (ms since 1970) as it was sent, and came at this tick. */
   hear(stamp: number, came: number): void {
     if (!Number.isFinite(stamp)) return;
@@ -41,27 +46,23 @@ export class ServerOffset {
    * tick and answered until another: the stamp was right, to two seconds, at some moment between them.
    */
   hearRoundTrip(stamp: number, asked: number, came: number): void {
-    if (!Number.isFinite(stamp) || this.#least.length > 0) return; // by far not as exact
+    if (!Number.isFinite(stamp) || this.isMeasured) return; // by far not as exact
     const [least, most] = [stamp - came, stamp + 2_000 - asked];
     if (this.#now < least || this.#now > most) this.#now = (least + most) / 2;
   }
 }
 
-const offset = new ServerOffset(Date.now() - tick());
-
-/** Take in a message of the server with its stamp. */
-export function hearStamp(at: string): void {
-  offset.hear(Date.parse(at), tick());
-}
+/** The clock by which the page goes: that of the editor and of the runner beside it. */
+export const pageClock = new ServerOffset(Date.now() - tick());
 
 /** Take in the header `Date` of an answer to what was asked at this tick. */
 export function hearAnswer(date: string | null, asked: number): void {
-  if (date !== null) offset.hearRoundTrip(Date.parse(date), asked, tick());
+  if (date !== null) pageClock.hearRoundTrip(Date.parse(date), asked, tick());
 }
 
 /** The server's time of a tick, ms since 1970, as far as it is known now. */
 export function serverTimeOf(at: number): number {
-  return at + offset.now();
+  return at + pageClock.now();
 }
 
 /** The server's time, ms since 1970. */

@@ -6,7 +6,8 @@
  */
 import { notifications } from "@mantine/notifications";
 import { readUmrfKeys } from "../api/graphs";
-import { errorPlace, errorText } from "../api/http";
+import { errorText } from "../api/http";
+import { errorPlace } from "../api/refusal-places";
 import { arrange, isUnplaced, positionsOf } from "../canvas/geometry/arrange";
 import { mapsFrom } from "../graph/document-keys";
 import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";

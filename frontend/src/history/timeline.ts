@@ -8,6 +8,7 @@ import { newestRun } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { type ListedRun, listRuns, NO_FILTER } from "../api/review";
 import type { Run } from "../api/runs";
+import { type AgedRun, newerFirst } from "../api/sites";
 import { useThrottledLink } from "../sync/use-room";
 import { instant } from "../ui/times";
 
@@ -196,7 +197,7 @@ export interface GoodRun {
   readonly seq: number;
 }
 
-type EndedRun = Pick<Run, "number" | "version" | "state" | "result">;
+type EndedRun = AgedRun & Pick<Run, "version" | "state" | "result">;
 
 /**
  * Return the runs that went well and were started with a known version, the last one at the end.
@@ -208,11 +209,11 @@ export function goodRuns(
   const seqOf = new Map(versions.map(({ id, seq }) => [id, seq]));
   return runs
     .filter(wentWell)
+    .sort((a, b) => newerFirst(b, a))
     .flatMap(({ number: run, version }) => {
       const seq = seqOf.get(version ?? "");
       return seq === undefined ? [] : [{ run, seq }];
-    })
-    .sort((a, b) => a.run - b.run);
+    });
 }
 
 /** The last one that was started with something before a moment. `goods` are in the order of runs. */

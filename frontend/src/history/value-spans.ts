@@ -3,6 +3,7 @@
 import type { Version } from "../api/graphs";
 import type { FieldBlame, FieldValue } from "../api/history";
 import type { ListedRun } from "../api/review";
+import { newerFirst } from "../api/sites";
 import { plainValue } from "../differences/difference-words";
 import { SILENT_FIELDS, shortText } from "../graph/field-words";
 import { runLabel } from "../status/progress";
@@ -57,7 +58,7 @@ export function spansOf(
       const seq = seqOf.get(run.version ?? "");
       return seq === undefined ? [] : [{ run, seq }];
     })
-    .sort((a, b) => a.run.number - b.run.number);
+    .sort((a, b) => newerFirst(b.run, a.run));
   const oldest = values.filter(({ overwritten }) => overwritten !== true).reverse();
   return oldest.map((value, i) => {
     const until = oldest[i + 1]?.seq ?? Number.POSITIVE_INFINITY;

@@ -1,10 +1,12 @@
 /** A graph as a card: how it is, and who is in it. */
+
 import { IconDots } from "@tabler/icons-react";
 import type { ComponentType } from "react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
 import { useKnownColors } from "../api/people";
 import type { Run } from "../api/runs";
+import { shiftOfRun } from "../api/site-places";
 import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { LateOpening } from "../ui/late-opening";
@@ -26,7 +28,10 @@ function LastRun({ run, now }: { run: Run; now: number }) {
   const going = run.ended_at === null;
   const at = instant(run.ended_at ?? run.started_at ?? run.requested_at);
   return (
-    <StateLabel {...useRunStatus(run)} {...(at === null || going ? {} : { more: ago(at, now) })} />
+    <StateLabel
+      {...useRunStatus(run)}
+      {...(at === null || going ? {} : { more: ago(at, now - shiftOfRun(run.id)) })}
+    />
   );
 }
 

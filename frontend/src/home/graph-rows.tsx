@@ -1,10 +1,12 @@
 /** Graphs as rows: name, last run in words, problems. */
+
 import { Skeleton } from "@mantine/core";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
 import { newestRun } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
+import { shiftOfRun } from "../api/site-places";
 import { runEndText, runStatus, type Tone } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { ago, instant, stopwatch, useNow } from "../ui/times";
@@ -37,8 +39,9 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
     tone = status.tone;
     const start = instant(run.started_at) ?? now;
     const end = instant(run.ended_at) ?? now;
-    const took = live.link === "down" ? "" : ` · ${stopwatch(now - start)}`;
-    words = goes ? `${by} · ${status.word}${took}` : `${runEndText(run)} · ${ago(end, now)}`;
+    const present = now - shiftOfRun(run.id);
+    const took = live.link === "down" ? "" : ` · ${stopwatch(present - start)}`;
+    words = goes ? `${by} · ${status.word}${took}` : `${runEndText(run)} · ${ago(end, present)}`;
   }
   return (
     <Link

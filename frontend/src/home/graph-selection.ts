@@ -2,6 +2,7 @@
 import type { GraphsWanted } from "../api/graph-list";
 import { hasEnded } from "../api/run-stop";
 import type { Run } from "../api/runs";
+import { newerFirst } from "../api/sites";
 
 export const ORDERS = {
   changed: "Last changed",
@@ -26,7 +27,8 @@ export function lastRuns(runs: readonly Run[]): Map<string, Run> {
   const newest = new Map<string, Run>();
   for (const run of runs) {
     if (run.graph === null) continue;
-    if (run.number > (newest.get(run.graph)?.number ?? -1)) newest.set(run.graph, run);
+    const known = newest.get(run.graph);
+    if (known === undefined || newerFirst(run, known) < 0) newest.set(run.graph, run);
   }
   return newest;
 }

@@ -6,7 +6,7 @@ import { useQueryClient } from "@tanstack/react-query";
 import { useId, useState } from "react";
 import { Link } from "wouter";
 import { refreshGraphs, refreshLibrary } from "../api/graphs";
-import { errorText, Refusal, refusedAt } from "../api/http";
+import { errorText, Refusal } from "../api/http";
 import {
   type ActionUse,
   type ActionUses,
@@ -16,6 +16,7 @@ import {
   updateUses,
   useActionUses,
 } from "../api/library";
+import { refusedAt } from "../api/refusal-places";
 import { DifferenceView } from "../differences/difference-view";
 import { pathWords } from "../graph/field-words";
 import { counted } from "../words/counted";

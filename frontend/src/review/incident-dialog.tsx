@@ -6,7 +6,7 @@ import { editor } from "../api/client";
 import { errorText, fetchAnswer } from "../api/http";
 import type { Run } from "../api/runs";
 import type { EditorApi } from "../api/schema/editor";
-import { runnerOfRun } from "../api/sites";
+import { runnerOfRun } from "../api/site-places";
 import { serverNow } from "../clock/server-clock";
 import { instant } from "../ui/times";
 

@@ -5,7 +5,6 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
-import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
 import {
@@ -18,7 +17,7 @@ import {
   removeEntry,
   useQueue,
 } from "../api/queue";
-import { SilentSites } from "../status/silent-sites";
+import { SilentSites, useMissingSites } from "../status/silent-sites";
 import { lineWords, valueLines } from "../status/value-words";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
@@ -164,9 +163,9 @@ function Line({ entry, place, before, afterNext, isLast }: LineProps) {
 }
 
 function Found({ queue: { entries, robots } }: { queue: Queue }) {
-  const silent = silentSites(useLive().now).length > 0;
+  const isWhole = useMissingSites("get /api/queue").length === 0;
   if (entries.length === 0)
-    return silent ? null : (
+    return !isWhole ? null : (
       <Empty icon={<IconHourglassEmpty size={22} />} title="Nothing waits">
         Where a robot is busy or others wait for it, <b>Wait in the queue</b> stands beside the
         start.
@@ -238,7 +237,7 @@ export function QueuePage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
               {errorText(found.error)}
             </Empty>
           )}
-          <SilentSites missing="what waits there" />
+          <SilentSites route="get /api/queue" missing="what waits there is not known" />
           {found.data && <Found queue={found.data} />}
         </div>
       </main>

@@ -5,7 +5,6 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
 import { errorText, unconfirmed } from "../api/http";
-import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import {
@@ -23,7 +22,7 @@ import type { Run } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/progress";
 import { SecondPerson } from "../status/second-person";
-import { SilentSites } from "../status/silent-sites";
+import { SilentSites, useMissingSites } from "../status/silent-sites";
 import { StateLabel } from "../status/state-label";
 import { lineWords, valueLines } from "../status/value-words";
 import { useWatching, WatchTicks } from "../status/watching";
@@ -277,8 +276,9 @@ export function RepeatPage({ id, bar }: PageProps & { id: string }) {
 }
 
 export function RepeatsPage({ bar }: PageProps) {
-  const { runner, now: live } = useLive();
+  const { runner } = useLive();
   const found = useRepeats(runner);
+  const isWhole = useMissingSites("get /api/repeats").length === 0;
   const now = useNow(60_000);
   return (
     <>
@@ -296,8 +296,8 @@ export function RepeatsPage({ bar }: PageProps) {
               {errorText(found.error)}
             </Empty>
           )}
-          <SilentSites missing="what is repeated there" />
-          {found.data?.length === 0 && silentSites(live).length === 0 && (
+          <SilentSites route="get /api/repeats" missing="what is repeated there is not known" />
+          {found.data?.length === 0 && isWhole && (
             <Empty icon={<IconRepeat size={22} />} title="Nothing was repeated yet">
               Choose <b>Repeat it</b> before a start: several times, or with each of several values.
             </Empty>

@@ -1,4 +1,5 @@
 /** Rows of the list of runs, by day: how each ended and why, its course, and the run before to compare with. */
+
 import { ActionIcon, Checkbox } from "@mantine/core";
 import { IconArrowsDiff, IconChartBar, IconPinFilled } from "@tabler/icons-react";
 import { type MouseEvent, useEffect, useMemo, useRef } from "react";
@@ -7,6 +8,7 @@ import { useCurrentName } from "../api/people";
 import type { ListedRun } from "../api/review";
 import { hasEnded } from "../api/run-stop";
 import { type Run, runPlace } from "../api/runs";
+import { shiftOfRun } from "../api/site-places";
 import { siteOfId } from "../api/sites";
 import { boundsText } from "../status/durations";
 import { fromWords } from "../status/earlier-list";
@@ -176,7 +178,9 @@ function Row({ run, now, chosen, onChoose, before }: RunRowProps) {
         <StateLabel tone={tone} word={word} />
         {!run.hidden && run.cause && <span className={style.cause}>{run.cause}</span>}
       </td>
-      <td className={style.course}>{!run.hidden && <CourseBar run={run} now={now} />}</td>
+      <td className={style.course}>
+        {!run.hidden && <CourseBar run={run} now={now - shiftOfRun(run.id)} />}
+      </td>
       <td className={style.fact}>
         {runPlace(run)}
         {siteName(run.id)}
@@ -266,7 +270,7 @@ export function RunList({ runs, chosen, onChoose, isGapless, goesOn }: RowsProps
               <Row
                 key={run.id}
                 run={run}
-                now={now}
+                now={now - shiftOfRun(run.id)}
                 chosen={chosen.includes(run.id)}
                 onChoose={(on) => onChoose(run.id, on)}
                 before={before.get(run.id) ?? (isLast ? null : undefined)}

@@ -13,13 +13,13 @@ import { useCurrentName } from "../api/people";
 import { type ReplayMark, useReplayData, useRunsOfSameStart } from "../api/review";
 import { type RunNote, useRunNotes } from "../api/run-notes";
 import { type Run, useRun } from "../api/runs";
+import { runTimeOf, shiftOfRun } from "../api/site-places";
 import { EditorStore, EditorStoreProvider } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
 import { isUnplaced } from "../canvas/geometry/arrange";
 import { topDown } from "../canvas/geometry/portrait";
 import { GraphView } from "../canvas/graph-view";
 import { TopDownButton, useTopDown } from "../canvas/top-down";
-import { serverTimeOf } from "../clock/server-clock";
 import { runMarks } from "../graph/breakpoints";
 import type { Key, Position } from "../graph/model";
 import { Answers } from "../status/answers";
@@ -338,7 +338,7 @@ function RunTimeline(props: RunTimelineProps) {
       <Timeline
         run={newest}
         lanes={lanes}
-        silentSince={unsure ? serverTimeOf(now.since) : silent}
+        silentSince={unsure ? runTimeOf(newest.id, now.since) : silent}
         selected={level.fact}
         onPick={onPick}
         picks={picks}
@@ -365,8 +365,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const level = useLevel(newest, search);
   const goes = newest.ended_at === null;
   const unsure = goes && live.link === "down";
-  const present = useNow(1000, goes);
-  const until = unsure ? serverTimeOf(live.since) : (instant(newest.ended_at) ?? present);
+  const present = useNow(1000, goes) - shiftOfRun(newest.id);
+  const until = unsure ? runTimeOf(newest.id, live.since) : (instant(newest.ended_at) ?? present);
   const replay = useReplay(runner, newest, until, momentAsked(newest, search));
   const { run } = replay;
   const past = replay.at !== null;

@@ -12,9 +12,8 @@ import {
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { errorText, runnerWords } from "../api/http";
+import { errorText } from "../api/http";
 import { CONDUCTED, enginesOf } from "../api/led-runs";
-import { silentSites } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useRepeats } from "../api/repeats";
 import {
@@ -27,6 +26,7 @@ import {
 } from "../api/review";
 import type { Run } from "../api/runs";
 import { type Site, siteOfId } from "../api/sites";
+import { SilentSites } from "../status/silent-sites";
 import { Empty } from "../ui/empty";
 import { QueueLink } from "./queue-page";
 import { RunFilters } from "./run-filters";
@@ -210,11 +210,7 @@ export function RunsPage() {
             </Button>
           )}
         </div>
-        {silentSites(now).map(({ site }) => (
-          <p key={site.url} className="m-0 quiet-12" role="status">
-            {runnerWords(site.name)} does not answer: some of its runs are missing here.
-          </p>
-        ))}
+        <SilentSites route="get /api/runs" missing="some of its runs are missing here" />
         {listed.isPending && <Waiting />}
         {runs.length === 0 && (
           <NoRuns

@@ -1,4 +1,5 @@
 /** One robot: its engine in words, what makes answers a proof, what runs there. */
+
 import { ActionIcon, Button, Menu, Tabs, Text } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
@@ -25,6 +26,7 @@ import {
   stopRobot,
   useIndexedByRobot,
 } from "../api/robots";
+import { shiftOfRobot } from "../api/site-places";
 import { Baton, OutOfService } from "../status/robot-rights";
 import { EngineLabel } from "../status/state-label";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
@@ -93,7 +95,7 @@ function robotSigns(robot: Robot, now: number): Sign[] {
 }
 
 function Signs({ robot }: { robot: Robot }) {
-  const now = useNow(1000);
+  const now = useNow(1000) - shiftOfRobot(robot.name);
   return (
     <ul className={style.signs}>
       {robotSigns(robot, now).map(({ good, text, age = "" }) => (
@@ -109,7 +111,9 @@ function Signs({ robot }: { robot: Robot }) {
 
 function Facts({ robot }: { robot: Robot }) {
   const now = useNow(1000);
-  const heard = useRobotAnsweredAt(robot.name) ?? instant(robot.heard_at);
+  const at = instant(robot.heard_at);
+  const heard =
+    useRobotAnsweredAt(robot.name) ?? (at === null ? null : at + shiftOfRobot(robot.name));
   const restarted = instant(robot.restarted_at);
   const took = robot.took_ms === null ? "" : ` within ${Math.max(1, Math.round(robot.took_ms))} ms`;
   return (

@@ -19,11 +19,10 @@ export function AskedLine({ below = false }: { below?: boolean }) {
   );
   const known = useMayAnswer(
     runner,
-    asked.map(({ question }) => question.id),
+    asked.map(({ run, question }) => ({ id: question.id, run: run.id })),
   );
   const mine = asked.filter(
-    ({ run, question }) =>
-      !(below && at === `/runs/${run.id}`) && (known === null || known.get(question.id)?.may),
+    ({ run, question }) => !(below && at === `/runs/${run.id}`) && known(question.id)?.may,
   );
   const [first] = mine;
   if (first === undefined) return null;

@@ -1,4 +1,5 @@
 /** Questions of a led run to people: each has a form that says what follows, and by when. */
+
 import { Button, FileButton, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCamera, IconMessageQuestion, IconSend } from "@tabler/icons-react";
@@ -14,6 +15,7 @@ import {
   useMayAnswer,
 } from "../api/questions";
 import type { Run } from "../api/runs";
+import { shiftOfRun } from "../api/site-places";
 import { usePendingText } from "../ui/drafts";
 import { HoldButton } from "../ui/hold-button";
 import { clock, duration, instant, useNow } from "../ui/times";
@@ -266,7 +268,9 @@ function AnswerForm({ run, question }: { run: Run; question: Question }) {
 }
 
 function Asked({ run, question, why }: { run: Run; question: Question; why: string }) {
-  const now = useNow(1000, question.deadline !== undefined || question.lapses_at !== undefined);
+  const now =
+    useNow(1000, question.deadline !== undefined || question.lapses_at !== undefined) -
+    shiftOfRun(run.id);
   const role = question.role ? `${isolated(question.role)} is asked. ` : "";
   return (
     <section
@@ -285,7 +289,7 @@ function Asked({ run, question, why }: { run: Run; question: Question; why: stri
 
 /** The waits of the runner itself: for how long, or until when. */
 function Pauses({ run }: { run: Run }) {
-  const now = useNow(1000, (run.pauses ?? []).length > 0);
+  const now = useNow(1000, (run.pauses ?? []).length > 0) - shiftOfRun(run.id);
   return (run.pauses ?? []).map(({ action, until }) => {
     const at = instant(until);
     return (
@@ -304,13 +308,12 @@ export function AskedPeople({ run }: { run: Run }) {
   const open = run.ended_at === null ? (run.questions ?? []) : [];
   const known = useMayAnswer(
     runner,
-    open.map(({ id }) => id),
+    open.map(({ id }) => ({ id, run: run.id })),
   );
   return (
     <>
       {open.map((question) => {
-        // Where the runner does not say who may answer, the answer itself is allowed or refused.
-        const about = known === null ? { may: true, why: "" } : known.get(question.id);
+        const about = known(question.id);
         const why = about?.may === false ? about.why || "Others are asked." : "";
         return (
           <Asked

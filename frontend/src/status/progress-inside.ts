@@ -5,6 +5,7 @@
 
 import { useRef } from "react";
 import type { Run } from "../api/runs";
+import { shiftOfRun } from "../api/site-places";
 import { fullName, type Graph } from "../graph/model";
 import { placesOf } from "./level-places";
 import {
@@ -115,7 +116,7 @@ export function progressBelow(
   graph: Pick<Graph, "actions">,
   levels: readonly string[],
 ): ReadonlyMap<string, Progress> {
-  return progressAt(progressInside(run, unsure, { graph, names, levels }), at);
+  return progressAt(progressInside(run, unsure, { graph, names, levels }), at, shiftOfRun(run.id));
 }
 
 export type ProgressByAid = ReadonlyMap<string, Progress>;
@@ -148,7 +149,7 @@ export function useProgress(
   if (run && graph && !inside)
     for (const [key, each] of progressInside(run, unsure, { graph, names: [] }, true))
       found.set(key, each);
-  const now = progressAt(found, at);
+  const now = progressAt(found, at, shiftOfRun(run?.id ?? ""));
   last.current = keptProgress(last.current, now);
   return last.current;
 }

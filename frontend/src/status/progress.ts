@@ -1,8 +1,10 @@
 /** State of an action of a run, and of the run, in one word and one tone. */
+
 import type { LiveState } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { MOVES } from "../api/run-stop";
 import type { ActionRun, Run, Visit } from "../api/runs";
+import { shiftOfRun } from "../api/site-places";
 import { serverTimeOf } from "../clock/server-clock";
 import { clock } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -14,7 +16,7 @@ export interface Progress {
   name?: string;
   tone: Tone;
   word: string;
-  /** Begin of the present visit, ms; null if none goes on. */
+  /** Begin of the present visit by the clock of the page, ms; null if none goes on. */
   since: number | null;
   /** Lower bound of the duration of the last visit, ms; null if none ended. */
   took: number | null;
@@ -138,7 +140,8 @@ export function progressOf(action: ActionRun, run: Run, unsure: Unsure): Progres
   return {
     tone,
     word,
-    since: until === null && !over && !action.asks ? from : null,
+    since:
+      from === null || until !== null || over || action.asks ? null : from + shiftOfRun(run.id),
     ...(last ? visitDuration(last) : { took: null, atMost: null }),
     visits: action.count ?? action.older + action.visits.length,
     ...(action.at_least ? { atLeast: true } : {}),
@@ -163,7 +166,8 @@ export function progressOfAction(
   run: Run,
   unsure: Unsure,
 ): Progress {
-  const key = `${name} ${run.ended_at !== null} ${isUnsure(action, run, unsure)}`;
+  const shift = Math.round(shiftOfRun(run.id) / 500);
+  const key = `${name} ${run.ended_at !== null} ${isUnsure(action, run, unsure)} ${shift}`;
   const before = lastSaid.get(action);
   if (before?.key === key) return before.progress;
   const progress = { name, ...progressOf(action, run, unsure) };
@@ -184,12 +188,19 @@ export function progressByAid(run: Run | null, unsure: Unsure): Map<string, Prog
   return found;
 }
 
-/** Progress as it was at a moment, ms: what went on then had gone on for so long. */
-export function progressAt(found: Map<string, Progress>, at: number | null): Map<string, Progress> {
+/**
+ * Progress as it was at a moment, ms: what went on then had gone on for so long. `shift`: from the clock of the run to
+ * that of the page.
+ */
+export function progressAt(
+  found: Map<string, Progress>,
+  at: number | null,
+  shift = 0,
+): Map<string, Progress> {
   if (at === null) return found;
   for (const [aid, progress] of found) {
     if (progress.since === null) continue;
-    found.set(aid, { ...progress, since: null, took: Math.max(0, at - progress.since) });
+    found.set(aid, { ...progress, since: null, took: Math.max(0, at + shift - progress.since) });
   }
   return found;
 }

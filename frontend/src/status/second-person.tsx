@@ -19,6 +19,7 @@ import {
 } from "../api/starts";
 import { isolated } from "../words/isolated";
 import style from "./second-person.module.css";
+import { SilentSites } from "./silent-sites";
 
 interface SecondPersonProps {
   graph: string;
@@ -142,6 +143,7 @@ function OneOrder(props: SecondPersonProps & { demand: Demand }) {
   return (
     <section className={style.second} aria-label="A second person">
       <Said given={given.data ?? []} me={person.id} label={label} />
+      <SilentSites route="get /api/approvals" missing="who said yes there is not known" />
       <OrderWords order={demand.order} />
       {taken !== null && (
         <Text size="sm" c={taken.digest === digest ? "var(--ink)" : "var(--warn)"}>
@@ -222,12 +224,20 @@ export function WantedYes({ graph, looks }: WantedProps) {
     ({ author, digest }) => author.id !== person.id && !own.has(digest),
   );
   const each = [...new Map(others.map((question) => [questionKey(question), question])).values()];
-  return each.map((question) =>
-    question.hidden ? (
-      <HiddenQuestion key={questionKey(question)} question={question} why={question.hidden} />
-    ) : (
-      <Wanted key={question.digest} graph={graph} question={question} me={person.id} />
-    ),
+  return (
+    <>
+      <SilentSites
+        route="get /api/approvals/asked"
+        missing="who asks for a yes there is not known"
+      />
+      {each.map((question) =>
+        question.hidden ? (
+          <HiddenQuestion key={questionKey(question)} question={question} why={question.hidden} />
+        ) : (
+          <Wanted key={question.digest} graph={graph} question={question} me={person.id} />
+        ),
+      )}
+    </>
   );
 }
 

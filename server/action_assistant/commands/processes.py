@@ -249,6 +249,7 @@ def sites_of(options: argparse.Namespace, runner_port: int) -> tuple[Site, ...]:
     """Return the runners of a page with several. Raise CannotStart if one cannot be used."""
     return sites(
         options.runners or os.environ.get(settings.RUNNERS, "").split(";"),
+        page_port=options.port,
         runner_port=runner_port,
         public=reached(options).public,
         tls=options.tls,

@@ -28,6 +28,7 @@ from action_assistant.commands.presses import press
 from action_assistant.commands.questions import add_questions
 from action_assistant.commands.repeats import add_repeats
 from action_assistant.commands.run_log import add_log
+from action_assistant.commands.runners import Gathered
 from action_assistant.commands.second_person import add_second_person
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line, told
@@ -192,7 +193,7 @@ def _runs(options: argparse.Namespace) -> int:
     if options.json:
         listed = found.json()
         if len(found.answers) > 1:
-            listed.sort(key=lambda run: datetime.fromisoformat(run["requested_at"]), reverse=True)
+            listed.sort(key=_begun, reverse=True)
         print_json(listed)
         return found.code
     from action_assistant.runner.runs.views import Listed
@@ -244,12 +245,14 @@ class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
 
 def _verify(options: argparse.Namespace) -> int:
     """Run the command: simulate every expected run again, with its graph of then and with the
-    present one, and print the verdicts. Return 0 if all go the same course, else 1."""
+    present one, and print the verdicts. Return 0 if all go the same course and no site is missing, else
+    1."""
     with running(options) as server:
-        verdicts = list(_verdicts(server, options))
+        expected = server.runners.gathered("/api/expectations")
+        verdicts = list(_verdicts(server, expected, options))
     if options.json:
         print_json(msgspec.to_builtins(verdicts))
-    elif not verdicts:
+    elif not verdicts and expected.code == 0:
         print("Nothing is expected yet: open a run in the page and choose “Expect this course”.")
     else:
         for each in verdicts:
@@ -257,15 +260,16 @@ def _verify(options: argparse.Namespace) -> int:
             print(one_line(f"{verdict}  {each.name} ({each.against})"))
             if each.why:
                 print(told(f"         {each.why}"))
-    return 0 if all(each.same for each in verdicts) else 1
+    return expected.code if all(each.same for each in verdicts) else 1
 
 
-def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVerdict]:
+def _verdicts(
+    server: Server, expected: Gathered, options: argparse.Namespace
+) -> Iterator[VerifyVerdict]:
     from action_assistant.runner.analysis.expected_runs import Expectation
 
     wanted = server.graph_id(options.graph) if options.graph else None
-    answer = server.runner("GET", "/api/expectations").content
-    for each in msgspec.json.decode(answer, type=list[Expectation]):
+    for each in (each for _, at in expected.answers for each in decoded(at, list[Expectation])):
         if wanted is not None and each.graph != wanted:
             continue
         inside = {sub.name: bytes(sub.umrf) for sub in each.subgraphs}
@@ -368,13 +372,20 @@ def _seq(server: Server, run: dict[str, Any]) -> int:
     return seq
 
 
+def _begun(run: dict[str, Any]) -> datetime:
+    """Return when a run (as JSON) was asked for. Each runner counts its own runs, so that numbers of two
+    say nothing about each other."""
+    return datetime.fromisoformat(run["requested_at"])
+
+
 def _last_good(server: Server, run: dict[str, Any]) -> int:
     """Return the change number (seq) of the graph in the last run before `run` (as JSON) that went
     well. Raise RequestRefused if there is no such run."""
-    query = {"graph": run["graph"]}
-    for each in server.runner("GET", "/api/runs", params=query).json():
+    runs = server.runners.gathered("/api/runs", params={"graph": run["graph"]}).json()
+    began = _begun(run)
+    for each in sorted(runs, key=_begun, reverse=True):
         went_well = each["state"] == "finished" and each["result"] in {None, "on_true"}
-        if each["number"] < run["number"] and went_well and each["version"] is not None:
+        if _begun(each) < began and went_well and each["version"] is not None:
             return _seq(server, each)
     raise RequestRefused("No run before it went well; name a change of the graph with --good.")
 

@@ -3,8 +3,9 @@
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { type GraphSummary, importGraph, type Preview, previewGraph } from "../../api/graphs";
-import { errorPlace, errorText, refusedAt } from "../../api/http";
+import { errorText } from "../../api/http";
 import { importAction, previewAction, replaceAction } from "../../api/library";
+import { errorPlace, refusedAt } from "../../api/refusal-places";
 import { tick } from "../../clock/server-clock";
 import { importReviews } from "./import-review";
 

@@ -19,7 +19,7 @@ import { useLive } from "../../api/page-link";
 import { useCurrentName, useMay } from "../../api/people";
 import { needsRestConfirmation } from "../../api/run-stop";
 import { abilitiesOf, pauseRun, type Run, resumeRun } from "../../api/runs";
-import { serverTimeOf } from "../../clock/server-clock";
+import { runTimeOf, shiftOfRun } from "../../api/site-places";
 import { boundsText } from "../../status/durations";
 import { fromWords } from "../../status/earlier-list";
 import { useRunStatus } from "../../status/progress";
@@ -100,7 +100,7 @@ function FoldButton({ folded, onFold }: { folded: boolean; onFold: Props["onFold
 function Origin({ run, until }: { run: Run; until: number | null }) {
   const by = useCurrentName(run.author);
   const goes = run.ended_at === null;
-  const present = useNow(1000, goes && until === null);
+  const present = useNow(1000, goes && until === null) - shiftOfRun(run.id);
   const start = instant(run.started_at) ?? present;
   const when = day(start, present);
   const started = when === "today" ? `at ${clock(start)}` : `${when} ${clock(start)}`;
@@ -162,7 +162,7 @@ export function RunHead(props: Props) {
         ))}
       <span className={style.version}>{versionLabel}</span>
       <StateLabel pill still {...useRunStatus(run)} />
-      <Origin run={run} until={unsure ? serverTimeOf(now.since) : null} />
+      <Origin run={run} until={unsure ? runTimeOf(run.id, now.since) : null} />
       <span className="flex-1" />
       {told !== "" && (
         <span className={style.alarm} role={announces ? "alert" : undefined} title={told}>

@@ -7,7 +7,7 @@ import { silentRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import { silentRests } from "../../api/run-stop";
 import { type ActionRun, currentAlarm, type Run, type Visit } from "../../api/runs";
-import { serverTimeOf } from "../../clock/server-clock";
+import { runTimeOf } from "../../api/site-places";
 import type { Graph } from "../../graph/model";
 import { Answers } from "../../status/answers";
 import { RunQuestions } from "../../status/held-notice";
@@ -155,7 +155,7 @@ function useSilence(): (run: Run) => number | null {
     if (run.ended_at !== null) return null;
     const engine = instant(run.unknown_since);
     if (now.link !== "down") return engine;
-    const since = serverTimeOf(now.since);
+    const since = runTimeOf(run.id, now.since);
     return Math.min(engine ?? since, since);
   };
 }

@@ -3,9 +3,9 @@ import { Button, Text } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
-import { pathRefused } from "../../api/http";
 import { useLive } from "../../api/page-link";
 import { usePerson } from "../../api/people";
+import { pathRefused } from "../../api/refusal-places";
 import {
   type ApprovalWanted,
   type AskedInput,

@@ -68,7 +68,8 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   }
   const unsent = stop.state === "unheard" || (stop.state === "asked" && waited > HEARD);
   if (unsent) {
-    const why = stop.detail || "The runner does not answer.";
+    const { kind, why: reason } = now.unreached ?? {};
+    const why = (kind === "strange" && reason) || stop.detail || "The runner does not answer.";
     return {
       tone: "loud",
       stays: true,
@@ -430,16 +431,16 @@ export function StopNotice() {
     (each) =>
       open > 0 || each.state !== "heard" || tick() - (each.provenAt ?? each.at) < GONE + 1000,
   );
-  const at = useTick(200, busy || states.some(({ link }) => link !== "live"));
+  const at = useTick(200, busy || [now, ...states].some(({ link }) => link !== "live"));
   const notice =
     now.sites === undefined
       ? runnerNotice(now, dismissed, at)
-      : noticeOfSites(
+      : (noticeOfSites(
           now.sites.map(({ site: { name }, state }) => ({
             name,
             notice: runnerNotice(withOwnStops(state, now.sites ?? []), dismissed, at),
           })),
-        );
+        ) ?? unreachableNotice(now, at));
   const aside = useAside(notice, last?.id ?? "");
   const element = useNoticeRoom(notice?.tone === "loud" && !aside.is);
   useRootMark("data-notice-aside", aside.is && notice !== null);

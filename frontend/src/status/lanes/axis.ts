@@ -13,7 +13,12 @@ export interface TimeAxis {
   readonly span: number;
   /** Start of the run, ms; set where a part of the run is shown, and what is outside of it is not. */
   readonly origin?: number;
+  /** From the clock of the run, by which the axis goes, to that of the page, ms. */
+  readonly shift?: number;
 }
+
+/** Return the present by the clock of an axis, ms. */
+export const presentOf = ({ shift = 0 }: TimeAxis): number => serverNow() - shift;
 
 /** A part of the time of a run, ms. */
 export interface TimeRange {
@@ -41,7 +46,7 @@ export function partOf(axis: TimeAxis, range: TimeRange | null): TimeAxis {
   const { start: origin, span } = axis;
   const from = Math.max(range?.from ?? origin, origin);
   const length = Math.min(range?.until ?? origin + span, origin + span) - from;
-  return length > 0 && length < span ? { start: from, span: length, origin } : axis;
+  return length > 0 && length < span ? { ...axis, start: from, span: length, origin } : axis;
 }
 
 /** Return the start of the run, ms, from which the moments of an axis are counted. */
@@ -224,7 +229,7 @@ export function useMoving(
       },
     );
     if (moved === undefined) return;
-    const since = () => serverNow() - axis.start;
+    const since = () => presentOf(axis) - axis.start;
     moved.currentTime = since();
     const looking = setInterval(() => {
       if (Math.abs(Number(moved.currentTime) - since()) > SLACK) moved.currentTime = since();

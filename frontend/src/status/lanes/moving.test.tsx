@@ -4,7 +4,7 @@
 import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { afterEach, expect, test, vi } from "vitest";
-import { hearStamp } from "../../clock/server-clock";
+import { pageClock, tick } from "../../clock/server-clock";
 import { growingWay, shareOf, type TimeAxis, useMoving, type Waypoint, WHOLE_WAY } from "./axis";
 
 afterEach(() => vi.useRealTimers());
@@ -51,7 +51,7 @@ test("what stood still while the computer slept is put where time is", async () 
   const animation = { currentTime: 0, cancel: vi.fn() };
   const animate = vi.fn(() => animation);
   moved = Object.assign(document.createElement("i"), { animate });
-  hearStamp(new Date(100_000).toISOString());
+  pageClock.hear(100_000, tick());
   const axis = { start: 95_000, span: 10_000 };
   const root = createRoot(document.createElement("div"));
   await act(() => root.render(<Moved axis={axis} />));
@@ -60,7 +60,7 @@ test("what stood still while the computer slept is put where time is", async () 
     WHOLE_WAY,
     expect.objectContaining({ duration: axis.span, easing: "steps(40)" }),
   );
-  hearStamp(new Date(103_000).toISOString()); // as the next beat says after the sleep
+  pageClock.hear(103_000, tick()); // as the next beat says after the sleep
   await act(() => vi.advanceTimersByTime(1000));
   expect(animation.currentTime).toBeCloseTo(9_000);
   await act(() => root.unmount());

@@ -1,4 +1,5 @@
 /** Lanes of runs over time, by robot: one for each action, with what is not known left hatched. */
+
 import { ActionIcon, Button } from "@mantine/core";
 import { IconZoomIn, IconZoomOut } from "@tabler/icons-react";
 import {
@@ -13,6 +14,7 @@ import {
 import { enginesOf } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import type { ActionRun, Run } from "../../api/runs";
+import { shiftOfRun } from "../../api/site-places";
 import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName, NAME_RANK, useNameColors } from "../../ui/name-colors";
@@ -27,6 +29,7 @@ import {
   isOn,
   originOf,
   partOf,
+  presentOf,
   shareOf,
   type TimeAxis,
   type TimeRange,
@@ -88,19 +91,21 @@ export interface TimeGap {
 
 /** From the first start to the last end; while something goes on it grows in steps. */
 function useAxis(tracks: readonly Track[]): TimeAxis {
+  const shift = shiftOfRun(tracks[0]?.run.id ?? "");
+  const present = serverNow() - shift;
   const starts = tracks.map(({ run }) => instant(run.started_at ?? run.requested_at));
-  const start = Math.min(...starts.filter((each) => each !== null), serverNow());
+  const start = Math.min(...starts.filter((each) => each !== null), present);
   const ends = tracks.map(({ run }) => instant(run.ended_at));
   const goes = ends.includes(null);
   const end = Math.max(...ends.map((each) => each ?? start));
   const [steps, setSteps] = useState(0);
   useEffect(() => {
     if (!goes) return;
-    const timer = setInterval(() => setSteps(growingSpan(serverNow() - start)), 250);
+    const timer = setInterval(() => setSteps(growingSpan(serverNow() - shift - start)), 250);
     return () => clearInterval(timer);
-  }, [goes, start]);
-  const span = goes ? Math.max(steps, growingSpan(serverNow() - start)) : wholeSpan(end - start);
-  return useMemo(() => ({ start, span }), [start, span]);
+  }, [goes, start, shift]);
+  const span = goes ? Math.max(steps, growingSpan(present - start)) : wholeSpan(end - start);
+  return useMemo(() => ({ start, span, ...(shift !== 0 && { shift }) }), [start, span, shift]);
 }
 
 /** Return the place of a tick, in per cent of the axis. */
@@ -215,7 +220,7 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
   };
   const onKeyDown = (event: KeyboardEvent) => {
     const key = keyOf(event);
-    const here = cursor ?? Math.min(serverNow(), axis.start + axis.span);
+    const here = cursor ?? Math.min(presentOf(axis), axis.start + axis.span);
     const goal = new Map<string, number | null>([
       ["ArrowLeft", here - 1000],
       ["ArrowRight", cursor === null ? null : here + 1000],
@@ -427,7 +432,7 @@ function Cursor({ side, label, live }: { side: Side; label: string; live: boolea
 
 /** Playhead at the present: its text is rendered once a second, and its line moves meanwhile. */
 function LiveCursor({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
-  const now = useNow(1000);
+  const now = useNow(1000) - (axis.shift ?? 0);
   const words = silentSince === null ? "live" : "not known";
   const label = `${stopwatch(now - axis.start)} ${words}`;
   return <Cursor side={sideOf(shareOf(axis, now))} label={label} live={silentSince === null} />;

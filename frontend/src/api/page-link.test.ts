@@ -1,0 +1,105 @@
+/** How the page finds its runners, and hears of others while it is open. */
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { Wire } from "../testing/wire";
+import { pageLink } from "./page-link";
+import { setSites } from "./sites";
+
+const chunk = vi.hoisted(() => ({ fails: true }));
+vi.mock("./live-sites", async (original) => {
+  if (chunk.fails) throw new TypeError("Failed to fetch dynamically imported module");
+  return await original();
+});
+
+const A = { name: "Hall A", url: "http://h:1" };
+const B = { name: "Hall B", url: "http://h:2" };
+const C = { name: "Hall C", url: "http://h:3" };
+
+let runners: object[];
+let asked: number;
+let posted: string[];
+const page = Object.assign(new EventTarget(), { hidden: false });
+
+beforeEach(async () => {
+  vi.useFakeTimers();
+  Wire.all = [];
+  chunk.fails = true;
+  runners = [A, B];
+  asked = 0;
+  posted = [];
+  page.hidden = false;
+  vi.stubGlobal("WebSocket", Wire);
+  vi.stubGlobal("document", page);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (init.method === "POST") posted.push(url);
+    if (!url.endsWith("/api/config")) return Response.json({});
+    asked += 1;
+    const several = runners.length > 1 ? { runners } : {};
+    return Response.json({ runner_url: A.url, ...several });
+  });
+  pageLink.enter("ada", 1);
+  await pass(10);
+});
+
+afterEach(async () => {
+  pageLink.leave();
+  await pass(6_000);
+  setSites([]);
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+/** Let time go by, and what is loaded in it come. */
+async function pass(ms: number): Promise<void> {
+  for (const part of [ms - 2, 1, 1]) {
+    await vi.advanceTimersByTimeAsync(part);
+    await vi.dynamicImportSettled();
+  }
+}
+
+const hear = () => {
+  for (const wire of Wire.all) wire.say({ type: "hello", engines: [], runs: [] });
+};
+
+test("STOP ALL reaches each site while a part of the page does not load, and the page goes on trying", async () => {
+  expect(pageLink.now().live?.state.unreached?.why).toContain("STOP goes to each runner");
+  expect(pageLink.now().runner).toBeUndefined(); // nothing is asked of one site that is meant for all
+  hear();
+  pageLink.now().live?.stop("all");
+  expect(posted).toEqual([`${A.url}/api/stop`, `${B.url}/api/stop`]);
+  chunk.fails = false;
+  await pass(2_000);
+  expect(pageLink.now().runner).toBe(A.url);
+  expect(pageLink.now().live?.state.link).toBe("live");
+  expect(pageLink.now().live?.state.stops).toHaveLength(1);
+});
+
+test("a page that is looked at hears of another runner, and shows it", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  runners = [A, B, C];
+  await pass(31_000);
+  const names = pageLink.now().live?.state.sites?.map(({ site }) => site.name);
+  expect(names).toEqual(["Hall A", "Hall B", "Hall C"]);
+  page.hidden = true;
+  await pass(30_000);
+  asked = 0;
+  await pass(300_000);
+  expect(asked).toBe(0);
+});
+
+test("STOP ALL asks whether there are others, and stops at these too", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  hear();
+  runners = [A, B, C];
+  pageLink.now().live?.stop("all");
+  await pass(10);
+  expect(posted).toEqual([A, B, C].map(({ url }) => `${url}/api/stop`));
+});
+
+test("whoever comes back has the sockets of all again", async () => {
+  pageLink.leave();
+  const before = Wire.all.length;
+  pageLink.enter("bob", 2);
+  expect(Wire.all.length - before).toBe(2); // also before the editor has answered
+});

@@ -1,0 +1,228 @@
+/** The sockets of all runners behind one, also without what joins them, and while runners come and go. */
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { serverNow } from "../clock/server-clock";
+import { noticeOfSites, runnerNotice, withOwnStops } from "../runs/stop/stop-notice";
+import { progressByAid } from "../status/progress";
+import { Wire } from "../testing/wire";
+import { SitesJoiner } from "./live-sites";
+import { type LiveState, openRuns, silentSites } from "./live-socket";
+import { RunnerSockets } from "./runner-sockets";
+import type { Run } from "./runs";
+import { siteOfId } from "./site-knowledge";
+import { shiftOfRun } from "./site-places";
+import { allSites, setSites } from "./sites";
+
+const A = { name: "Hall A", url: "http://h:1" };
+const B = { name: "Hall B", url: "http://h:2" };
+const C = { name: "Hall C", url: "http://h:3" };
+const run = (id: string, more: object = {}) => ({
+  ...{ id, number: 1, engine: "Dora", state: "running", ended_at: null, group: null },
+  ...{ requested_at: "2026-11-30T10:00:00Z", unknown_since: null, desired: "running" },
+  ...{ graph_name: "g", actions: {}, alarms: [], ...more },
+});
+const wiresOf = (url: string) =>
+  Wire.all.filter((each) => each.url.startsWith(url.replace("http", "ws")));
+const wireOf = (url: string): Wire => {
+  const wire = wiresOf(url).at(-1);
+  if (wire === undefined) throw new Error(`no socket to ${url}`);
+  return wire;
+};
+const hello = (url: string, ...runs: object[]) =>
+  wireOf(url).say({ type: "hello", engines: [], runs });
+const said = ({ sites = [] }: LiveState) =>
+  noticeOfSites(
+    sites.map(({ site: { name }, state }) => ({
+      name,
+      notice: runnerNotice(withOwnStops(state, sites), new Set(), performance.now()),
+    })),
+  )?.text.replace(/[\u2066-\u2069]/g, "");
+
+/** The URLs to which Stops were posted, and the ids of these Stops. */
+let posted: { url: string; id: string }[];
+let silent: string[];
+let live: RunnerSockets;
+const stopped = () => posted.map(({ url }) => url.slice(0, 10)).sort();
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  Wire.all = [];
+  posted = [];
+  silent = [];
+  vi.stubGlobal("WebSocket", Wire);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (init.method === "POST") posted.push({ url, id: JSON.parse(String(init.body)).stop_id });
+    if (silent.some((each) => url.startsWith(each))) throw new TypeError("no answer");
+    return Response.json({});
+  });
+  live = new RunnerSockets();
+});
+
+afterEach(() => {
+  live.close();
+  setSites([]);
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("STOP ALL reaches each site, and is proven there, though what joins them does not load", async () => {
+  live.setSites([A, B]);
+  live.lose("A part of this page did not load.");
+  hello(A.url, run("a"));
+  hello(B.url, run("b", { number: 2 }));
+  expect(live.state.link).toBe("down"); // what runs is shown by nothing of this page
+  expect(live.state.unreached?.why).toContain("did not load");
+  silent = [B.url];
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(1_100);
+  expect(stopped()).toEqual([A.url, B.url, B.url]);
+  expect(JSON.parse(wireOf(B.url).sent[0] ?? "").run).toBe("all");
+  const rest = { state: "stopped", ended_at: "2026-11-30T10:01:00Z", desired: "stopped" };
+  wireOf(A.url).say({ type: "run", run: run("a", rest) });
+  await vi.advanceTimersByTimeAsync(200);
+  expect(said(live.state)).toMatch(/NOT SENT at Hall B.* Hall A: Run 1: stopped\./);
+});
+
+test("a Stop of the time in which nothing was joined is one with what comes later", async () => {
+  live.setSites([A, B]);
+  hello(A.url, run("a"));
+  hello(B.url, run("b"));
+  live.stop("all");
+  live.joinBy(new SitesJoiner());
+  expect(live.state.link).toBe("live");
+  expect(openRuns(live.state)).toHaveLength(2);
+  expect(live.state.stops).toHaveLength(1);
+});
+
+test("a Stop before any runner is known is kept and said not to be sent, and goes to each", async () => {
+  const asked = vi.fn();
+  live = new RunnerSockets(asked);
+  live.stop("all");
+  expect(asked).toHaveBeenCalledOnce();
+  expect(live.state.stops.map(({ run, state }) => [run, state])).toEqual([["all", "asked"]]);
+  await vi.advanceTimersByTimeAsync(600_000); // the editor does not answer
+  live.setSites([A, B]);
+  expect(stopped()).toEqual([A.url, B.url]);
+  expect(new Set(posted.map(({ id }) => id))).toEqual(new Set([live.state.stops[0]?.id]));
+});
+
+test("a site that comes while the page is open is shown, and has what STOP ALL was about", async () => {
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
+  for (const { url } of [A, B]) hello(url);
+  live.stop("all");
+  live.setSites([A, B, C]);
+  expect(wiresOf(A.url)).toHaveLength(1); // nobody is dialled anew
+  expect(stopped()).toEqual([A.url, B.url, C.url]);
+  expect(new Set(posted.map(({ id }) => id)).size).toBe(1);
+  expect(silentSites(live.state).map(({ site }) => site.name)).toEqual(["Hall C"]);
+  hello(C.url, run("c"));
+  expect(openRuns(live.state).map(({ id }) => id)).toEqual(["c"]);
+  expect(siteOfId("c")?.name).toBe("Hall C");
+  posted = [];
+  live.stop("all");
+  expect(stopped()).toEqual([A.url, B.url, C.url]);
+});
+
+test("a site that comes long after a Stop keeps what its people started", async () => {
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(61_000);
+  posted = [];
+  live.setSites([A, B, C]);
+  expect(posted.filter(({ url }) => url.startsWith(C.url))).toEqual([]);
+});
+
+test("a second site makes of one runner two, and its socket stays", () => {
+  live.setSites([{ name: "", url: A.url }]);
+  hello(A.url, run("a"));
+  expect(live.state.sites).toBeUndefined();
+  expect(allSites()).toEqual([]);
+  live.setSites([A, B]);
+  live.stop("all");
+  expect(stopped()).toEqual([A.url, B.url]); // also before they are joined
+  live.joinBy(new SitesJoiner());
+  expect(live.state.sites?.map(({ site }) => site.name)).toEqual(["Hall A", "Hall B"]);
+  expect(openRuns(live.state).map(({ id }) => id)).toEqual(["a"]);
+  expect(wiresOf(A.url)).toHaveLength(1);
+});
+
+test("a site that has moved gets the Stops that nobody has answered, and no other", async () => {
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
+  for (const { url } of [A, B]) hello(url);
+  hello(B.url, run("b"));
+  wireOf(B.url).close(1006);
+  silent = [B.url];
+  live.stop("b");
+  await vi.advanceTimersByTimeAsync(100);
+  const [first] = posted;
+  posted = [];
+  live.setSites([A, { ...B, url: C.url }]);
+  expect(posted).toEqual([{ url: `${C.url}/api/runs/b/stop`, id: first?.id }]);
+  await vi.advanceTimersByTimeAsync(1_100);
+  posted = [];
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(posted).toEqual([]); // the former place is asked no more
+  expect(live.state.sites?.map(({ site }) => site.url)).toEqual([A.url, C.url]);
+});
+
+test("a site that is named no longer stays while something goes on there, and goes when it rests", () => {
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
+  hello(A.url);
+  hello(B.url, run("b"));
+  const names = () => live.state.sites?.map(({ site }) => site.name);
+  for (let look = 0; look < 2; look += 1) {
+    live.setSites([A]);
+    expect(names()).toEqual(["Hall A", "Hall B (no longer listed)"]);
+  }
+  live.stop("all");
+  expect(stopped()).toEqual([A.url, B.url]);
+  wireOf(B.url).say({ type: "run", run: run("b", { ended_at: "2026-11-30T10:01:00Z" }) });
+  live.setSites([A]);
+  expect(names()).toEqual(["Hall A", "Hall B (no longer listed)"]); // the Stop has no answer yet
+});
+
+test("a site that is named no longer and rests is gone, and one runner needs no name", async () => {
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
+  for (const { url } of [A, B]) hello(url);
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(100);
+  live.setSites([{ name: "", url: A.url }]);
+  expect(live.state.sites).toBeUndefined();
+  expect(wireOf(B.url).readyState).not.toBe(WebSocket.OPEN);
+  posted = [];
+  live.stop("all");
+  expect(stopped()).toEqual([A.url]);
+});
+
+test("a site whose clock is ahead makes nothing of the others older, and its own is as old as it is", async () => {
+  live.setSites([A, B]);
+  live.joinBy(new SitesJoiner());
+  for (const { url } of [A, B]) hello(url);
+  const now = Date.UTC(2026, 10, 30, 10);
+  const beat = (url: string, at: number, run: string) => {
+    const text = (ms: number) => new Date(ms).toISOString();
+    wireOf(url).say({ type: "beat", at: text(at), seen: { [run]: text(at - 400) }, heard: {} });
+  };
+  for (let each = 0; each < 12; each += 1) beat(A.url, now, "a"); // stamps of earlier tests are forgotten
+  beat(B.url, now + 60_000, "b");
+  beat(A.url, now, "a");
+  expect(Math.round(serverNow() - now)).toBe(0);
+  hello(B.url, run("b"));
+  for (const id of ["a", "b"]) {
+    expect(Math.round(serverNow() - (live.runSeenAt.get(id) ?? 0))).toBe(400);
+  }
+  expect(Math.round(shiftOfRun("b"))).toBe(-60_000);
+  const shift = shiftOfRun("b");
+  beat(B.url, now + 60_040, "b"); // a message that was quicker
+  expect(shiftOfRun("b")).toBe(shift); // nothing is drawn anew
+  const begun = new Date(now + 60_000 - 5_000).toISOString(); // five seconds ago, by its own clock
+  const visit = { from: begun, not_before: begun, until: null, not_after: null };
+  const action = { aid: "A", state: "RUNNING", count: 1, visits: [visit], messages: [] };
+  const going = run("b", { actions: { A: action } }) as unknown as Run;
+  const { since } = progressByAid(going, false).get("A") ?? {};
+  expect(Math.round(serverNow() - (since ?? 0))).toBe(5_000);
+});

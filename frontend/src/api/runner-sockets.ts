@@ -1,0 +1,174 @@
+/**
+ * The live sockets of all runners of the page behind one. STOP has this, and reaches each of them by it; what
+ * joins the states of several (`live-sites.ts`) is loaded with several only, and may never come.
+ */
+import { tick } from "../clock/server-clock";
+import { newAid } from "../graph/stop-basics";
+import { isWaiting, LiveSocket, type LiveState, type StopRequest, tellEach } from "./live-socket";
+import { type Site, setSites } from "./sites";
+
+export interface Part {
+  readonly site: Site;
+  readonly socket: LiveSocket;
+}
+
+type Times = Pick<LiveSocket, "runSeenAt" | "robotAnsweredAt">;
+
+/** Joins what the sockets of several sites know, and knows which of them has what. */
+export interface Joiner {
+  join(parts: readonly Part[]): LiveState;
+  joinTimes(parts: readonly Part[]): Times;
+  /** Returns the sites that have a run or group; all while that is not known. */
+  having(run: string): readonly Part[];
+  /** Returns the site that has a run, if that is known. */
+  homeOf(run: string): Part | undefined;
+  /** Returns those of the parts that the editor does not name any more of which not all is known to rest. */
+  keep(left: readonly Part[], sites: readonly Site[]): readonly Part[];
+}
+
+const LATE = 60_000; // ms in which a site of which the page hears gets an earlier STOP ALL as well
+
+export const NOTHING: LiveState = {
+  asked: [],
+  link: "connecting",
+  since: tick(),
+  engines: [],
+  runs: new Map(),
+  stops: [],
+};
+
+/** Usable without React: `subscribe` and `state` fit `useSyncExternalStore`. */
+export class RunnerSockets implements Times {
+  state = NOTHING;
+  runSeenAt: ReadonlyMap<string, number> = new Map();
+  robotAnsweredAt: ReadonlyMap<string, number> = new Map();
+  #parts: readonly Part[] = [];
+  #joiner: Joiner | undefined;
+  /** Reason why what goes on is not known, apart from the reasons of the sockets. */
+  #lost = "";
+  /** Each STOP ALL, for sites of which the page hears later. */
+  #pressed: readonly StopRequest[] = [];
+  readonly #listeners = new Set<() => void>();
+  readonly #seers = new Set<() => void>();
+  readonly #onStop: () => void;
+
+  /** `onStop`: a Stop was sent to all sites that are known; there may be others by now. */
+  constructor(onStop: () => void = () => {}) {
+    this.#onStop = onStop;
+  }
+
+  /** Takes the runners as the editor names them, and keeps the sockets of those that it knew. */
+  setSites(sites: readonly Site[]): void {
+    const old = this.#parts;
+    const parts = sites.map((site, i): Part => {
+      const known = old.find((part) => part.site.url === site.url);
+      if (known?.site.name === site.name) return known;
+      return { site, socket: known?.socket ?? new LiveSocket(site.url, i === 0) };
+    });
+    if (parts.length === old.length && parts.every((part, i) => part === old[i])) return;
+    const left = old.filter(({ socket }) => !parts.some((part) => part.socket === socket));
+    const kept = this.#joiner?.keep(left, sites) ?? [];
+    this.#parts = [...parts, ...kept];
+    setSites(this.#parts.length > 1 ? this.#parts.map(({ site }) => site) : []);
+    const isFirst = old.length === 0;
+    for (const { site, socket } of parts) {
+      if (old.some((part) => part.socket === socket)) continue;
+      const late = this.#pressed.filter((stop) => isFirst || tick() - stop.at < LATE);
+      const moved = left.find((part) => part.site.name === site.name)?.socket.state.stops ?? [];
+      const ids = new Map([...late, ...moved.filter(isWaiting)].map(({ id, run }) => [id, run]));
+      tellEach(
+        [...ids].map(
+          ([id, run]) =>
+            () =>
+              socket.stop(run, id),
+        ),
+      );
+      socket.subscribe(() => this.#hear());
+      socket.subscribeSeen(() => this.#see());
+      tellEach([() => socket.open()]);
+    }
+    for (const { socket } of left) if (!kept.some((part) => part.socket === socket)) socket.close();
+    this.lose("");
+  }
+
+  /** Takes what joins the states of several sites. */
+  joinBy(joiner: Joiner): void {
+    this.#joiner = joiner;
+    this.lose("");
+  }
+
+  get isJoined(): boolean {
+    return this.#joiner !== undefined;
+  }
+
+  /** Says why runners are not known, or not what goes on there. */
+  lose(why: string): void {
+    this.#lost = why;
+    this.#hear();
+  }
+
+  close(): void {
+    for (const { socket } of this.#parts) socket.close();
+  }
+
+  redial(): void {
+    for (const { socket } of this.#parts) socket.redial();
+  }
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+
+  subscribeSeen = (seer: () => void): (() => void) => {
+    this.#seers.add(seer);
+    return () => this.#seers.delete(seer);
+  };
+
+  /**
+   * Sends Stop of a run or group to its site, to all while it is not known which one has it. STOP ALL also goes
+   * to each site of which the page hears a little later, as from an editor that did not answer.
+   */
+  stop(run: string | "all"): void {
+    const id = newAid();
+    const having = run === "all" ? undefined : this.#joiner?.having(run);
+    tellEach((having ?? this.#parts).map((part) => () => part.socket.stop(run, id)));
+    if (run !== "all") return;
+    const stop = { id, run, at: tick(), runs: [], state: "asked", detail: "" } as const;
+    this.#pressed = [...this.#pressed.slice(-4), stop];
+    if (this.#parts.length === 0) this.#hear();
+    this.#onStop();
+  }
+
+  learn(run: Parameters<LiveSocket["learn"]>[0]): void {
+    const [part, ...others] = this.#parts;
+    const home = others.length === 0 ? part : this.#joiner?.homeOf(run.id);
+    home?.socket.learn(run); // of an unknown site it stays unknown to all
+  }
+
+  #hear(): void {
+    this.state = this.#joined();
+    tellEach(this.#listeners);
+  }
+
+  #see(): void {
+    const [part, ...others] = this.#parts;
+    const times = others.length === 0 ? part?.socket : this.#joiner?.joinTimes(this.#parts);
+    this.runSeenAt = times?.runSeenAt ?? this.runSeenAt;
+    this.robotAnsweredAt = times?.robotAnsweredAt ?? this.robotAnsweredAt;
+    tellEach(this.#seers);
+  }
+
+  #joined(): LiveState {
+    const [part, ...others] = this.#parts;
+    if (part !== undefined && others.length === 0) return part.socket.state;
+    if (part !== undefined && this.#joiner !== undefined) return this.#joiner.join(this.#parts);
+    const lost = this.#lost !== "" && {
+      link: "down" as const,
+      unreached: { kind: part ? ("mute" as const) : ("silent" as const), why: this.#lost },
+    };
+    const sites = this.#parts.map(({ site, socket: { state } }) => ({ site, state }));
+    const stops = part?.socket.state.stops ?? this.#pressed;
+    return { ...NOTHING, ...lost, stops, ...(part && { sites }) };
+  }
+}
