@@ -12,7 +12,6 @@ import {
   type ViewedThing,
   type ViewLink,
 } from "../api/view-links";
-import { SilentSites } from "../status/silent-sites";
 import { ConfirmRow } from "../ui/confirm-row";
 import { copyText } from "../ui/copy-text";
 import { ago, dateText, instant, useNow } from "../ui/times";
@@ -181,7 +180,6 @@ export function ViewLinks({ thing, origin }: Props) {
           </ul>
         </section>
       )}
-      <SilentSites route="get /api/view-links" missing="its links are not known" />
       {frames.length === 0 && (
         <Text size="sm" c="dimmed">
           No other site may show these links in a frame: name the sites in{" "}
