@@ -35,7 +35,7 @@ class ByProxy:
         room = f"{self.url.replace('https', 'wss', 1)}/api/graphs/{graph}/room"
         async with (
             httpx.AsyncClient(verify=self.trust, trust_env=False) as client,
-            httpx_ws.aconnect_ws(room, client, headers=BEARER) as session,
+            httpx_ws.aconnect_ws(room, client, headers={**BEARER}) as session,
         ):
             yield session
 
