@@ -1,6 +1,8 @@
 """What is of a graph goes to the editor that owns it, and nobody sees a difference."""
 
 import asyncio
+import contextlib
+import http.client
 import signal
 import time
 from collections.abc import Callable
@@ -60,6 +62,17 @@ def test_what_is_of_no_graph_is_answered_here(pair: Pair) -> None:
     with pair.here.client() as here:
         assert graph not in [each["id"] for each in here.get("/api/graphs").json()]
         assert here.get("/api/graphs/names").status_code == 200
+
+
+@pytest.mark.parametrize("dots", ["..", "%2e%2e", "x/../..", "."])
+def test_no_path_leads_out_of_what_is_of_the_graph(pair: Pair, dots: str) -> None:
+    """The other editor takes edits of this one at addresses beside those of its API."""
+    graph = pair.new_graph()
+    inner = f"/api/graphs/{graph}/{dots}/{dots}/{dots}/rooms/graph%2F{graph}"
+    for editor in (pair.here, pair.there):
+        with contextlib.closing(http.client.HTTPConnection(editor.url[7:])) as plain:
+            plain.request("GET", inner, headers=BEARER)
+            assert plain.getresponse().status == 404
 
 
 async def test_people_at_both_editors_are_in_one_room(pair: Pair) -> None:

@@ -14,7 +14,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from action_assistant.editor.cluster.owners import Elsewhere, Here, Owners
 from action_assistant.editor.cluster.relay_seal import SCHEME, RelayedFacts, RelaySeal
-from action_assistant.errors import OutcomeUnknown, Unavailable
+from action_assistant.errors import NotFound, OutcomeUnknown, Unavailable
 from action_assistant.logs import request_id
 from action_assistant.web.auth.caller import caller
 
@@ -127,6 +127,9 @@ class Peers:
 
     async def _send(self, stream: str, owner: Elsewhere, call: Call) -> httpx.Response:
         url = httpx.URL(f"{owner.url}{PREFIX}{call.target}")
+        path, _, _ = call.target.partition("?")
+        if url.raw_path.partition(b"?")[0].count(b"/") != f"{PREFIX}{path}".count("/"):
+            raise NotFound("There is nothing at this address.")  # it resolves to another path
         sealed = self._sealed(call, url.raw_path.decode())
         request = httpx.Request(
             call.method, url, headers=[*call.headers, *sealed], content=call.body

@@ -43,7 +43,10 @@ _MOST: Final = 10_000_000  # bytes of a body; no route of a graph takes more
 
 def stream_of(path: str) -> str | None:
     """Return the stream to whose owner a request for this path belongs; None for paths that every editor
-    answers."""
+    answers, as those with `.` or `..`: no route has one, and whoever sends them on resolves them to
+    another path."""
+    if not {".", ".."}.isdisjoint(path.split("/")):
+        return None
     found = _OF_A_GRAPH.fullmatch(path)
     return None if found is None else graph_stream(found[1] or found[2])
 
