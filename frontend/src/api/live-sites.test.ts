@@ -55,7 +55,9 @@ beforeEach(() => {
     if (silent.some((each) => url.startsWith(each))) throw new TypeError("no answer");
     const found = answers.get(url);
     if (found !== undefined) return Response.json(found, { status: 201 });
-    return url.startsWith(`${A.url}/api/runs/new/`) ? Response.json(NONE, NONE) : Response.json({});
+    return url.startsWith(`${A.url}/api/runs/new/`)
+      ? Response.json(NONE, NONE)
+      : Response.json({ runs: [] });
   });
   live = new RunnerSockets();
   live.setSites([A, B]);

@@ -1,14 +1,7 @@
 /** Joins the states of the live sockets of all sites: what is not known of one hides nothing of the others. */
 import { pageClock, serverTimeOf, tick } from "../clock/server-clock";
 import { runnerWords } from "./http";
-import {
-  foreignGraphs,
-  isWaiting,
-  type LiveState,
-  openRuns,
-  type SiteState,
-  type StopRequest,
-} from "./live-socket";
+import type { LiveState, SiteState, StopRequest } from "./live-socket";
 import type { Robot } from "./robots";
 import type { Joiner, Part } from "./runner-sockets";
 import type { Run } from "./runs";
@@ -17,7 +10,6 @@ import { siteRouter } from "./site-requests";
 import { type Site, setSiteRouter } from "./sites";
 
 const STEADY = 250; // ms by which the clock of a site may differ from what is shown
-const UNLISTED = " (no longer listed)";
 
 export class SitesJoiner implements Joiner {
   #parts: readonly Part[] = [];
@@ -70,19 +62,6 @@ export class SitesJoiner implements Joiner {
 
   homeOf(run: string): Part | undefined {
     return this.#partOf(siteOfId(run));
-  }
-
-  keep(left: readonly Part[], sites: readonly Site[]): readonly Part[] {
-    const isMoved = ({ site, socket: { state } }: Part) =>
-      state.link !== "live" && sites.some(({ name }) => name === site.name);
-    const goesOn = ({ socket: { state } }: Part) =>
-      openRuns(state).length + foreignGraphs(state).length > 0 || state.stops.some(isWaiting);
-    return left
-      .filter((part) => !isMoved(part) && goesOn(part))
-      .map(({ site, socket }) => ({
-        site: { ...site, name: `${site.name.replace(UNLISTED, "")}${UNLISTED}` },
-        socket,
-      }));
   }
 
   /** What is drawn by it is not drawn anew with each message: a site with the right time has 0. */

@@ -32,7 +32,7 @@ beforeEach(() => {
   vi.stubGlobal("WebSocket", Wire);
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     posted(init.method, url);
-    const body = url.endsWith("/api/runs/r") ? run("lost", "2026-01-01T00:00:00Z") : {};
+    const body = url.endsWith("/api/runs/r") ? run("lost", "2026-01-01T00:00:00Z") : { runs: [] };
     return new Response(JSON.stringify(body), { status: 200 });
   });
 });
@@ -149,7 +149,7 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     if (init.method === "POST") posted("POST", url);
     if (dead) throw new TypeError("no network");
-    return new Response("{}", { status: 202 });
+    return Response.json({ runs: [] }, { status: 202 });
   });
   live.stop("all");
   newest().close();
@@ -164,6 +164,16 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
   const heard = posted.mock.calls.length;
   await vi.advanceTimersByTimeAsync(10_000);
   expect(posted.mock.calls.length).toBe(heard);
+  live.close();
+});
+
+test("an answer that names no runs is none of the runner, and the Stop is sent again", async () => {
+  const live = opened(run("running"));
+  vi.stubGlobal("fetch", async () => Response.json({ status: "ok" }));
+  newest().close();
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(2_000);
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
   live.close();
 });
 
@@ -446,7 +456,7 @@ function answering(answers: Record<string, number | [number, object]>) {
     posted(init.method ?? "GET", url);
     const [, found] = Object.entries(answers).find(([part]) => url.includes(part)) ?? [];
     if (found === undefined) throw new TypeError("no network");
-    const [status, body] = Array.isArray(found) ? found : [found, {}];
+    const [status, body] = Array.isArray(found) ? found : [found, { runs: [] }];
     return Response.json(body, { status });
   });
 }

@@ -31,7 +31,7 @@ beforeEach(async () => {
   vi.stubGlobal("document", page);
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     if (init.method === "POST") posted.push(url);
-    if (!url.endsWith("/api/config")) return Response.json({});
+    if (!url.endsWith("/api/config")) return Response.json({ runs: [] });
     asked += 1;
     const several = runners.length > 1 ? { runners } : {};
     return Response.json({ runner_url: A.url, ...several });
@@ -67,8 +67,7 @@ test("STOP ALL reaches each site while a part of the page does not load, and the
   pageLink.now().live?.stop("all");
   expect(posted).toEqual([`${A.url}/api/stop`, `${B.url}/api/stop`]);
   chunk.fails = false;
-  await pass(2_000);
-  expect(pageLink.now().runner).toBe(A.url);
+  await vi.waitFor(() => expect(pageLink.now().runner).toBe(A.url));
   expect(pageLink.now().live?.state.link).toBe("live");
   expect(pageLink.now().live?.state.stops).toHaveLength(1);
 });
@@ -102,4 +101,15 @@ test("whoever comes back has the sockets of all again", async () => {
   const before = Wire.all.length;
   pageLink.enter("bob", 2);
   expect(Wire.all.length - before).toBe(2); // also before the editor has answered
+});
+
+test("an answer that does not say where the runners are takes no way of Stop", async () => {
+  hear();
+  const answered = fetch;
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) =>
+    url.endsWith("/api/config") ? Response.json({}) : answered(url, init),
+  );
+  await pass(31_000);
+  pageLink.now().live?.stop("all");
+  expect(posted).toEqual([`${A.url}/api/stop`, `${B.url}/api/stop`]);
 });

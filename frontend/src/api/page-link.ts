@@ -31,6 +31,8 @@ class PageLink {
   /** What is asked now, and whether it has to be asked once more. */
   #asking: "no" | "yes" | "again" = "no";
   #next: ReturnType<typeof setTimeout> | undefined;
+  /** Ends the pause between two tries. */
+  #goOn = () => {};
 
   now = (): PageLinkState => this.#state;
 
@@ -67,8 +69,9 @@ class PageLink {
   /** Asks where the runners are, until the editor has told it: without that there is no way for Stop. */
   look = (): void => {
     clearTimeout(this.#next);
-    if (this.#asking !== "no") this.#asking = "again";
-    else void this.#ask();
+    if (this.#asking === "no") return void this.#ask();
+    this.#asking = "again";
+    this.#goOn();
   };
 
   async #ask(): Promise<void> {
@@ -81,7 +84,10 @@ class PageLink {
       } catch (error) {
         this.#state.live?.lose(errorText(error));
       }
-      await new Promise((done) => setTimeout(done, wait));
+      await new Promise<void>((done) => {
+        this.#goOn = done;
+        setTimeout(done, wait);
+      });
     }
     this.#asking = "no";
     if (this.#state.signedIn) this.#again();
@@ -95,10 +101,13 @@ class PageLink {
     const { runner_url: url, runners } = await editor.get("/api/config", {}).catch((error) => {
       throw new Error(`The runner’s address is not known. ${errorText(error)}`);
     });
-    this.#sites = runners ?? [{ name: "", url }];
+    const sites = runners ?? [{ name: "", url }];
+    if (!url || sites.length === 0 || sites.some((site) => !site.url))
+      throw new Error("What the editor’s address answers does not say where the runners are.");
+    this.#sites = sites;
     const { live } = this.#state;
     live?.setSites(this.#sites); // STOP waits for nothing that comes later
-    if (runners !== undefined && live?.isJoined === false) {
+    if (live?.isApart === true) {
       const joiner = await import("./live-sites").then(
         ({ SitesJoiner }) => new SitesJoiner(),
         (error) => {

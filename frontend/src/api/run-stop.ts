@@ -43,7 +43,7 @@ export function needsRestConfirmation(run: Run): boolean {
   return Boolean(run.unconfirmed) && !moves;
 }
 
-/** Asks to stop one run, or all of them. */
+/** Asks to stop one run, or all of them. Throws if what answers does not say which runs it stops. */
 export async function postStop(
   runner: string,
   run: string | "all",
@@ -51,7 +51,10 @@ export async function postStop(
 ): Promise<unknown> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
   const request = { method: "POST", body: { stop_id: stop }, timeoutMs: 3_000 } as const;
-  return (await fetchAnswer(`${runner}${path}`, request)).json();
+  const answer: unknown = await (await fetchAnswer(`${runner}${path}`, request)).json();
+  if (!Array.isArray((answer as { runs?: unknown } | null)?.runs))
+    throw new Error("What answers there is not the runner.");
+  return answer;
 }
 
 export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {

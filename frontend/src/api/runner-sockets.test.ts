@@ -4,6 +4,7 @@ import { serverNow } from "../clock/server-clock";
 import { noticeOfSites, runnerNotice, withOwnStops } from "../runs/stop/stop-notice";
 import { progressByAid } from "../status/progress";
 import { Wire } from "../testing/wire";
+import { runnerAt } from "./client";
 import { SitesJoiner } from "./live-sites";
 import { type LiveState, openRuns, silentSites } from "./live-socket";
 import { RunnerSockets } from "./runner-sockets";
@@ -20,6 +21,7 @@ const run = (id: string, more: object = {}) => ({
   ...{ requested_at: "2026-11-30T10:00:00Z", unknown_since: null, desired: "running" },
   ...{ graph_name: "g", actions: {}, alarms: [], ...more },
 });
+const DORA = { name: "Dora", simulated: false, state: "answering", holds: [] };
 const wiresOf = (url: string) =>
   Wire.all.filter((each) => each.url.startsWith(url.replace("http", "ws")));
 const wireOf = (url: string): Wire => {
@@ -52,7 +54,7 @@ beforeEach(() => {
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     if (init.method === "POST") posted.push({ url, id: JSON.parse(String(init.body)).stop_id });
     if (silent.some((each) => url.startsWith(each))) throw new TypeError("no answer");
-    return Response.json({});
+    return Response.json({ runs: [] });
   });
   live = new RunnerSockets();
 });
@@ -160,6 +162,8 @@ test("a site that has moved gets the Stops that nobody has answered, and no othe
   posted = [];
   live.setSites([A, { ...B, url: C.url }]);
   expect(posted).toEqual([{ url: `${C.url}/api/runs/b/stop`, id: first?.id }]);
+  hello(C.url, run("b"));
+  live.setSites([A, { ...B, url: C.url }]); // as the page hears again and again
   await vi.advanceTimersByTimeAsync(1_100);
   posted = [];
   await vi.advanceTimersByTimeAsync(5_000);
@@ -182,6 +186,68 @@ test("a site that is named no longer stays while something goes on there, and go
   wireOf(B.url).say({ type: "run", run: run("b", { ended_at: "2026-11-30T10:01:00Z" }) });
   live.setSites([A]);
   expect(names()).toEqual(["Hall A", "Hall B (no longer listed)"]); // the Stop has no answer yet
+});
+
+test("a site that has moved is stopped at its former address until the new one says what goes on", async () => {
+  live.joinBy(new SitesJoiner());
+  live.setSites([A, B]);
+  hello(A.url);
+  hello(B.url, run("b"));
+  silent = [C.url];
+  live.setSites([A, { ...B, url: C.url }]);
+  live.stop("all");
+  expect(stopped()).toEqual([A.url, B.url, C.url]);
+  wireOf(B.url).close(1006);
+  live.setSites([A, { ...B, url: C.url }]);
+  posted = [];
+  live.stop("all");
+  expect(stopped()).toEqual([A.url, B.url, C.url]);
+});
+
+test("one runner that moves is stopped at both addresses, also where nothing joins them", () => {
+  live.setSites([{ name: "", url: A.url }]);
+  hello(A.url, run("a"));
+  live.setSites([{ name: "", url: C.url }]);
+  live.stop("all");
+  expect(stopped()).toEqual([A.url, C.url]);
+});
+
+test("a Stop that is not proven stays in sight when its runner moves, or is named no longer", async () => {
+  live.joinBy(new SitesJoiner());
+  live.setSites([A, B]);
+  hello(A.url);
+  hello(B.url, run("b"));
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  wireOf(B.url).close(1006);
+  live.setSites([A, { ...B, url: C.url }]);
+  hello(C.url);
+  live.setSites([A, { ...B, url: C.url }]);
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(said(live.state)).toContain("UNCONFIRMED");
+});
+
+test("of several runners that became one, Stop of a run goes to that one", () => {
+  live.joinBy(new SitesJoiner());
+  live.setSites([A, B]);
+  for (const { url } of [A, B]) hello(url);
+  live.setSites([{ name: "", url: C.url }]);
+  hello(C.url, run("c"));
+  live.stop("c");
+  expect(posted.map(({ url }) => url)).toEqual([`${C.url}/api/runs/c/stop`]);
+});
+
+test("nothing is started at a runner that is named no longer", async () => {
+  live.joinBy(new SitesJoiner());
+  live.setSites([A, B]);
+  hello(A.url);
+  wireOf(B.url).say({ type: "hello", engines: [DORA], runs: [run("b")] });
+  live.setSites([A, { ...B, url: C.url }]);
+  const start = { body: { engine: "Dora", request_id: "q" } as never };
+  await expect(runnerAt(A.url).post("/api/runs", start)).rejects.toThrow(
+    "nothing is started there",
+  );
+  expect(posted).toEqual([]);
 });
 
 test("a site that is named no longer and rests is gone, and one runner needs no name", async () => {

@@ -4,7 +4,15 @@
  */
 import { tick } from "../clock/server-clock";
 import { newAid } from "../graph/stop-basics";
-import { isWaiting, LiveSocket, type LiveState, type StopRequest, tellEach } from "./live-socket";
+import {
+  foreignGraphs,
+  isWaiting,
+  LiveSocket,
+  type LiveState,
+  openRuns,
+  type StopRequest,
+  tellEach,
+} from "./live-socket";
 import { type Site, setSites } from "./sites";
 
 export interface Part {
@@ -22,8 +30,6 @@ export interface Joiner {
   having(run: string): readonly Part[];
   /** Returns the site that has a run, if that is known. */
   homeOf(run: string): Part | undefined;
-  /** Returns those of the parts that the editor does not name any more of which not all is known to rest. */
-  keep(left: readonly Part[], sites: readonly Site[]): readonly Part[];
 }
 
 const LATE = 60_000; // ms in which a site of which the page hears gets an earlier STOP ALL as well
@@ -36,6 +42,31 @@ export const NOTHING: LiveState = {
   runs: new Map(),
   stops: [],
 };
+
+const UNLISTED = " (no longer listed)";
+
+const nameOf = ({ site }: Part) => (site.isUnlisted ? site.name.replace(UNLISTED, "") : site.name);
+
+const unlisted = (part: Part): Part => ({
+  site: { ...part.site, name: `${nameOf(part)}${UNLISTED}`, isUnlisted: true },
+  socket: part.socket,
+});
+
+/**
+ * Return whether the socket of a site that the editor does not name any more is still needed: something goes on
+ * there, or a Stop is not proven. One that has moved is needed until its new address says what goes on.
+ */
+function isNeeded(part: Part, listed: readonly Part[]): boolean {
+  const { state } = part.socket;
+  if (state.stops.some((stop) => stop.state === "heard" && stop.provenAt === undefined))
+    return true;
+  const isMoved = listed.some(
+    ({ site, socket }) => site.name === nameOf(part) && socket.state.link === "live",
+  );
+  if (isMoved && state.link !== "live") return false;
+  const goesOn = openRuns(state).length + foreignGraphs(state).length > 0;
+  return goesOn || state.stops.some(isWaiting);
+}
 
 /** Usable without React: `subscribe` and `state` fit `useSyncExternalStore`. */
 export class RunnerSockets implements Times {
@@ -67,14 +98,14 @@ export class RunnerSockets implements Times {
     });
     if (parts.length === old.length && parts.every((part, i) => part === old[i])) return;
     const left = old.filter(({ socket }) => !parts.some((part) => part.socket === socket));
-    const kept = this.#joiner?.keep(left, sites) ?? [];
+    const kept = left.filter((part) => isNeeded(part, parts)).map(unlisted);
     this.#parts = [...parts, ...kept];
     setSites(this.#parts.length > 1 ? this.#parts.map(({ site }) => site) : []);
     const isFirst = old.length === 0;
     for (const { site, socket } of parts) {
       if (old.some((part) => part.socket === socket)) continue;
       const late = this.#pressed.filter((stop) => isFirst || tick() - stop.at < LATE);
-      const moved = left.find((part) => part.site.name === site.name)?.socket.state.stops ?? [];
+      const moved = left.find((part) => nameOf(part) === site.name)?.socket.state.stops ?? [];
       const ids = new Map([...late, ...moved.filter(isWaiting)].map(({ id, run }) => [id, run]));
       tellEach(
         [...ids].map(
@@ -97,8 +128,9 @@ export class RunnerSockets implements Times {
     this.lose("");
   }
 
-  get isJoined(): boolean {
-    return this.#joiner !== undefined;
+  /** Whether there are several sockets, and nothing that joins what they know. */
+  get isApart(): boolean {
+    return this.#parts.length > 1 && this.#joiner === undefined;
   }
 
   /** Says why runners are not known, or not what goes on there. */
@@ -131,7 +163,8 @@ export class RunnerSockets implements Times {
    */
   stop(run: string | "all"): void {
     const id = newAid();
-    const having = run === "all" ? undefined : this.#joiner?.having(run);
+    const isOfOne = run !== "all" && this.#parts.length > 1;
+    const having = isOfOne ? this.#joiner?.having(run) : undefined;
     tellEach((having ?? this.#parts).map((part) => () => part.socket.stop(run, id)));
     if (run !== "all") return;
     const stop = { id, run, at: tick(), runs: [], state: "asked", detail: "" } as const;

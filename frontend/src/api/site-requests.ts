@@ -72,7 +72,7 @@ const askSites: SiteRouter["ask"] = async (route, sent, ask) => {
   if (route === "get /api/starts/{request_id}")
     return foundStart(String(sent.path?.request_id), askNoting(ask));
   if (route === "post /api/preflight" && !isLed(sent.body)) return preflights(sent.body, ask);
-  if (OF_ROBOTS.has(route)) return askNoting(ask)(siteOfStart(sent.body));
+  if (OF_ROBOTS.has(route)) return askNoting(ask)(listed(siteOfStart(sent.body)));
   const { name, ...ids } = { ...sent.path };
   if (name !== undefined && / \/api\/(queue\/)?robots\//.test(route))
     return ask(siteOf([String(name)]));
@@ -298,6 +298,12 @@ function siteOfStart(body: unknown): Site {
     (robots.length === 0 && earlier ? siteOfId(String(earlier)) : undefined) ?? siteOf(robots);
   const request = isObject(start) ? start.request_id : undefined;
   if (request !== undefined) noteSite(String(request), site);
+  return site;
+}
+
+/** Throws `Refusal` for a site that the editor does not name any more: its robots may be another runner's now. */
+function listed(site: Site): Site {
+  if (site.isUnlisted) throw refused(`${isolated(site.name)}: nothing is started there.`);
   return site;
 }
 

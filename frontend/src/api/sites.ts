@@ -8,6 +8,8 @@ export interface Site {
   readonly name: string;
   /** The URL of its runner, without a slash at the end. */
   readonly url: string;
+  /** Set if the editor does not name it any more: nothing is started there. */
+  readonly isUnlisted?: true;
 }
 
 /** Sends the request to one site, perhaps with another query or body, and returns the JSON of its answer. */

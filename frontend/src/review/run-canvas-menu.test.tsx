@@ -3,7 +3,7 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
-import { afterEach, beforeEach, expect, test } from "vitest";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { standInForBrowser } from "../testing/browser";
@@ -16,11 +16,13 @@ const graph = fromUmrf({ graph_name: "g", actions: [{ name: "Work", instance_id:
 let root: Root;
 
 beforeEach(() => {
+  vi.stubGlobal("fetch", () => new Promise(() => {})); // nobody answers
   root = createRoot(document.body.appendChild(document.createElement("div")));
 });
 
 afterEach(() => {
   act(() => root.unmount());
+  vi.unstubAllGlobals();
   document.body.replaceChildren();
 });
 

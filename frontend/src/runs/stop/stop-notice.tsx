@@ -251,8 +251,8 @@ function toldStops(now: LiveState, dismissed: ReadonlySet<string>): StopRequest[
 /** Return whether one of the later Stops means all that a Stop is about. */
 function isCovered(stop: StopRequest, later: readonly StopRequest[], now: LiveState): boolean {
   const runs = stopTargets(stop, now);
-  const means = ({ run }: StopRequest) =>
-    run === "all" ||
+  const means = ({ run, runs: stopped }: StopRequest) =>
+    (run === "all" && runs.every((each) => stopped.includes(each.id) || isAtRest(each))) ||
     run === stop.run ||
     (runs.length > 0 && runs.every((each) => each.group === run));
   return later.some(means);
