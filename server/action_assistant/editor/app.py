@@ -299,7 +299,7 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
         relay=None if settings.cluster is None else partial(_relaying, app_state),
     )
     if settings.cluster is not None:
-        made.entrance = _entrance(app_state, made, keys)
+        made.entrance = _entrance(app_state, made, keys, settings.cluster.url)
         made.leave = lambda: app_state.services.rooms.move_away()
     return made
 
@@ -317,12 +317,12 @@ def _relaying(app_state: EditorState, app: ASGIApp) -> ASGIApp:
     return Relay(app, lambda stream: app_state.services.rooms.owned(stream), peers)
 
 
-def _entrance(app_state: EditorState, made: Application, keys: Keys) -> ASGIApp:
+def _entrance(app_state: EditorState, made: Application, keys: Keys, url: str) -> ASGIApp:
     from action_assistant.editor.api.entrance import Entrance  # slow to load
     from action_assistant.editor.cluster.relay_seal import RelaySeal
 
     seal = RelaySeal(keys.relay_key)
-    return Entrance(made.access.relayed, seal, lambda: app_state.services.rooms)
+    return Entrance(made.access.relayed, url, seal, lambda: app_state.services.rooms)
 
 
 def _addresses(settings: EditorSettings) -> Addresses:

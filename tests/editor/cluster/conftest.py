@@ -20,7 +20,7 @@ from support.product import TOKEN, free_ports
 
 
 class ClusterEditor(Editor):
-    """One of both editors. `inner`: where the other one reaches it."""
+    """One of the two editors. `inner`: where the other one reaches it."""
 
     def __init__(self, data: Path, database: str, owners: Path) -> None:
         super().__init__(data)

@@ -31,7 +31,7 @@ class OneOfSeveral(Editor):
 
     @property
     def url(self) -> str:
-        """Where it listens."""
+        """Return the address at which it listens."""
         return f"http://{self._host}:{self.port}"
 
     def start(self) -> None:

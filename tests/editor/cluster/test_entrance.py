@@ -20,65 +20,82 @@ from support.product import TOKEN
 SEAL = RelaySeal(Keys(TOKEN).relay_key)
 OWNER = RelayedFacts(Identity(Person("ann", "Ann", "owner")), "192.0.2.7", "request-1")
 VIEWER = RelayedFacts(Identity(Person("vic", "Vic", "viewer")), "192.0.2.8", "request-2")
+#: The facts of a request of the server itself.
+OF_A_ROOM = RelayedFacts(OWNER.identity, is_inner=True)
+
+
+class Inside(httpx.Client):
+    """A program on the private network, which seals its requests as another editor does."""
+
+    def sealed(
+        self,
+        method: str,
+        path: str,
+        body: bytes = b"",
+        facts: RelayedFacts = OWNER,
+        seal: RelaySeal = SEAL,
+        to: str = "",
+    ) -> dict[str, str]:
+        """Return the header fields of a sealed request. `to`: the editor, if it is another one."""
+        return dict(seal.headers(method, f"{to or self._inner}{path}", body, facts))
+
+    def __init__(self, inner: str) -> None:
+        super().__init__(base_url=inner, trust_env=False)
+        self._inner = inner
 
 
 @pytest.fixture
-def inside(pair: Pair) -> Iterator[httpx.Client]:
+def inside(pair: Pair) -> Iterator[Inside]:
     """A program on the private network."""
-    with httpx.Client(base_url=pair.there.inner, trust_env=False) as client:
+    with Inside(pair.there.inner) as client:
         yield client
 
 
-def sealed(
-    method: str, path: str, body: bytes = b"", facts: RelayedFacts = OWNER, seal: RelaySeal = SEAL
-) -> dict[str, str]:
-    """Return the header fields of another editor."""
-    return dict(seal.headers(method, path, body, facts))
-
-
 def test_a_sealed_request_is_answered_for_the_person_that_it_names(
-    pair: Pair, inside: httpx.Client
+    pair: Pair, inside: Inside
 ) -> None:
     path = f"/internal/api/graphs/{pair.new_graph()}"
     body = b'{"name": "new"}'
     json = {"content-type": "application/json"}
-    found = inside.patch(path, content=body, headers={**json, **sealed("PATCH", path, body)})
+    found = inside.patch(path, content=body, headers={**json, **inside.sealed("PATCH", path, body)})
     assert (found.status_code, found.json()["name"]) == (200, "new")
     refused = inside.patch(
-        path, content=body, headers={**json, **sealed("PATCH", path, body, VIEWER)}
+        path, content=body, headers={**json, **inside.sealed("PATCH", path, body, VIEWER)}
     )
     assert (refused.status_code, refused.json()["type"]) == (403, "forbidden")
 
 
-def test_a_seal_is_good_once_for_one_request(pair: Pair, inside: httpx.Client) -> None:
+def test_a_seal_is_good_once_for_one_request(pair: Pair, inside: Inside) -> None:
     path, other = (f"/internal/api/graphs/{pair.new_graph()}" for _ in range(2))
-    good = sealed("GET", path)
+    good = inside.sealed("GET", path)
     assert inside.get(path, headers=good).status_code == 200
     wrong = {
         "once more": inside.get(path, headers=good),
-        "another path": inside.get(other, headers=sealed("GET", path)),
-        "a query": inside.get(f"{path}?a=b", headers=sealed("GET", path)),
-        "another method": inside.delete(path, headers=sealed("GET", path)),
+        "another path": inside.get(other, headers=inside.sealed("GET", path)),
+        "a query": inside.get(f"{path}?a=b", headers=inside.sealed("GET", path)),
+        "another method": inside.delete(path, headers=inside.sealed("GET", path)),
         "another body": inside.put(
-            f"{path}/umrf", content=b"{}", headers=sealed("PUT", f"{path}/umrf")
+            f"{path}/umrf", content=b"{}", headers=inside.sealed("PUT", f"{path}/umrf")
         ),
         "another person": inside.get(
             path,
-            headers=sealed("GET", path, facts=VIEWER)
-            | {"x-relayed": sealed("GET", path)["x-relayed"]},
+            headers=inside.sealed("GET", path, facts=VIEWER)
+            | {"x-relayed": inside.sealed("GET", path)["x-relayed"]},
         ),
+        "another editor": inside.get(path, headers=inside.sealed("GET", path, to=pair.here.inner)),
         "no seal": inside.get(path),
         "the token": inside.get(path, headers={"authorization": f"Bearer {TOKEN}"}),
         "another token": inside.get(
-            path, headers=sealed("GET", path, seal=RelaySeal(Keys("k" * 43).relay_key))
+            path, headers=inside.sealed("GET", path, seal=RelaySeal(Keys("k" * 43).relay_key))
         ),
         "early": inside.get(
-            path, headers=sealed("GET", path, seal=RelaySeal(Keys(TOKEN).relay_key, ago(60)))
+            path, headers=inside.sealed("GET", path, seal=RelaySeal(Keys(TOKEN).relay_key, ago(60)))
         ),
         "late": inside.get(
-            path, headers=sealed("GET", path, seal=RelaySeal(Keys(TOKEN).relay_key, ago(-60)))
+            path,
+            headers=inside.sealed("GET", path, seal=RelaySeal(Keys(TOKEN).relay_key, ago(-60))),
         ),
-        "nobody": inside.get(path, headers=sealed("GET", path, facts=RelayedFacts())),
+        "nobody": inside.get(path, headers=inside.sealed("GET", path, facts=RelayedFacts())),
         "no time": inside.get(path, headers=good | {"authorization": "Relay //"}),
         "nonsense": inside.get(
             path, headers=good | {"authorization": "Relay \xe4".encode("latin-1")}
@@ -88,7 +105,7 @@ def test_a_seal_is_good_once_for_one_request(pair: Pair, inside: httpx.Client) -
         why: (each.status_code, each.headers.get("www-authenticate")) for why, each in wrong.items()
     } == dict.fromkeys(wrong, (401, "Relay"))
     assert all(each.json()["type"] == "unauthenticated" for each in wrong.values())
-    assert inside.get(path, headers=sealed("GET", path)).status_code == 200
+    assert inside.get(path, headers=inside.sealed("GET", path)).status_code == 200
 
 
 def ago(seconds: float) -> Callable[[], float]:
@@ -96,25 +113,41 @@ def ago(seconds: float) -> Callable[[], float]:
 
 
 def test_what_this_editor_does_not_own_is_refused_and_never_passed_on(
-    pair: Pair, inside: httpx.Client
+    pair: Pair, inside: Inside
 ) -> None:
     graph = pair.new_graph()
     pair.give(f"graph/{graph}", pair.here)
-    for path in (f"/internal/api/graphs/{graph}", f"/internal/rooms/graph%2F{graph}"):
-        assert inside.get(path, headers=sealed("GET", path)).status_code == 421
+    room = f"/internal/rooms/graph%2F{graph}"
+    for path, facts in ((f"/internal/api/graphs/{graph}", OWNER), (room, OF_A_ROOM)):
+        assert inside.get(path, headers=inside.sealed("GET", path, facts=facts)).status_code == 421
     for path in ("/internal/api/people", "/internal/api/graphs", "/api/graphs/x", "/internal/"):
-        assert inside.get(path, headers=sealed("GET", path)).status_code == 404
+        assert inside.get(path, headers=inside.sealed("GET", path)).status_code == 404
 
 
-def test_the_public_port_knows_no_seals(pair: Pair) -> None:
+def test_what_a_client_sent_reaches_no_room_and_what_is_for_a_room_no_route(
+    pair: Pair, inside: Inside
+) -> None:
+    graph = pair.new_graph()
+    room, route = f"/internal/rooms/graph%2F{graph}", f"/internal/api/graphs/{graph}"
+    for path, facts, status in (
+        *((room, OF_A_ROOM, 200), (room, OWNER, 404)),
+        *((route, OWNER, 200), (route, OF_A_ROOM, 404)),
+    ):
+        found = inside.get(path, headers=inside.sealed("GET", path, facts=facts))
+        assert found.status_code == status, (path, facts)
+
+
+def test_the_public_port_knows_no_seals(pair: Pair, inside: Inside) -> None:
     graph = pair.new_graph()
     with httpx.Client(base_url=pair.there.url, trust_env=False) as stranger:
         for path in (f"/internal/api/graphs/{graph}", f"/api/graphs/{graph}"):
-            assert stranger.get(path, headers=sealed("GET", path)).status_code == 401
+            assert stranger.get(path, headers=inside.sealed("GET", path)).status_code == 401
     with pair.there.client() as person:
         path = f"/internal/api/graphs/{graph}"
         assert (
-            person.get(path, headers={"x-relayed": sealed("GET", path)["x-relayed"]}).status_code
+            person.get(
+                path, headers={"x-relayed": inside.sealed("GET", path)["x-relayed"]}
+            ).status_code
             == 404
         )
     for editor in (
@@ -124,7 +157,7 @@ def test_the_public_port_knows_no_seals(pair: Pair) -> None:
         with editor.client() as person:
             claimed = {
                 name: value
-                for name, value in sealed("GET", "/x").items()
+                for name, value in inside.sealed("GET", "/x").items()
                 if name != "authorization"
             }
             made = person.post(f"/api/graphs/{graph}/versions", json={}, headers=claimed)

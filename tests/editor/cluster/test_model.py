@@ -1,5 +1,5 @@
-"""Whatever is lost, late, frozen or cut off: a model of several editors keeps every edit once, and each mistake that
-could be made in its rules is found."""
+"""A model of several editors keeps every edit once, whatever is lost, late, frozen or cut off; and the model finds
+each mistake that could be made in its rules."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""What is of a graph goes to the editor that owns it, and nobody sees a difference."""
+"""Requests of a graph go to the editor that owns it, and nobody sees a difference."""
 
 import asyncio
 import contextlib

@@ -17,7 +17,7 @@ STREAM = "graph/g"
 
 
 class Editor:
-    """What of an editor owns streams: its journal and its owners."""
+    """The journal of an editor, and its owners of streams."""
 
     def __init__(self, name: str, journal: Journal, owners: SharedOwners) -> None:
         self.url = f"http://{name}"

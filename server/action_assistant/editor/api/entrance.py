@@ -45,10 +45,14 @@ class Admitted(Protocol):
 
 class Entrance:
     """An ASGI application that takes what other editors have sealed, for graphs that this editor owns, and
-    nothing else. It relays nothing on: what this editor does not own is refused with 421."""
+    nothing else. It relays nothing on: what this editor does not own is refused with 421. `url`: where the others
+    find it."""
 
-    def __init__(self, app: Admitted, seal: RelaySeal, rooms: Callable[[], Rooms]) -> None:
+    def __init__(
+        self, app: Admitted, url: str, seal: RelaySeal, rooms: Callable[[], Rooms]
+    ) -> None:
         self._app = app
+        self._url = url
         self._seal = seal
         self._rooms = rooms
 
@@ -62,7 +66,7 @@ class Entrance:
             path = call["path"].removeprefix(PREFIX)
             is_of_room = path.startswith(ROOMS)
             stream = path.removeprefix(ROOMS) if is_of_room else stream_of(path)
-            if stream is None:
+            if stream is None or is_of_room != facts.is_inner:
                 raise NotFound(f"Nothing is relayed to {path}.")
             begin({"request": facts.request})
             if not await self._answered(stream, call, receive, send, facts, body):
@@ -134,7 +138,7 @@ class Entrance:
             name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
         }
         target = plain_target(scope["raw_path"], scope["query_string"])
-        facts = self._seal.verified(scope.get("method", "GET"), target, headers)
+        facts = self._seal.verified(scope.get("method", "GET"), f"{self._url}{target}", headers)
         is_socket = scope["type"] == ScopeType.WEBSOCKET
         body = b"" if is_socket else await whole_body(receive)
         if hashlib.sha256(body).hexdigest() != headers[DIGEST]:

@@ -30,7 +30,8 @@ class OthersChanges:
 
     def __init__(self, journal: Journal, people: Refresh, rules: Refresh) -> None:
         self._journal = journal
-        self._refreshes = {"people": people, "rules": rules}
+        # Rules come first: people wait for changes of persons that are being stored.
+        self._refreshes = {"rules": rules, "people": people}
         self._due = set(self._refreshes)  # what was read before the cursor began
         self._seen = Cursor()
 
@@ -47,11 +48,11 @@ class OthersChanges:
         while True:
             try:
                 await self.look()
-            except (
-                Refused
-            ) as error:  # the journal cannot be read; then nothing can be changed, either
+            except Refused as error:  # where nothing can be read, nothing can be changed, either
                 log.warning("changes of other editors are not read: %s", error.detail)
-            except Exception:  # it is tried again
+            except (
+                Exception
+            ):  # a fault of this program must not end it: copies would grow old for good
                 log.exception("changes of other editors cannot be read")
             await anyio.sleep(_LOOK_S)
 
@@ -60,9 +61,10 @@ class OthersChanges:
         before = self._seen
         self._seen, changed = await self._journal.ask(lambda connection: _news(connection, before))
         self._due |= changed
-        for kind in sorted(self._due):
-            await self._refreshes[kind]()
-            self._due.discard(kind)
+        for kind, refresh in self._refreshes.items():
+            if kind in self._due:
+                await refresh()
+                self._due.discard(kind)
 
 
 def _news(connection: Connection, seen: Cursor | None) -> tuple[Cursor, set[str]]:

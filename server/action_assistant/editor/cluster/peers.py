@@ -50,13 +50,15 @@ class _AnswerLost(Exception):
 
 
 class Call(NamedTuple):
-    """A request to relay. `target`: its path and query as they came in; `headers`: those that go along."""
+    """A request to relay. `target`: its path and query as they came in; `headers`: those that go along;
+    `is_inner`: it is one of the server itself to a room."""
 
     method: str
     target: str
     headers: Sequence[tuple[str, str]] = ()
     body: bytes = b""
     client: str = ""
+    is_inner: bool = False
 
 
 def plain_target(path: bytes, query: bytes) -> str:
@@ -130,7 +132,7 @@ class Peers:
         path, _, _ = call.target.partition("?")
         if url.raw_path.partition(b"?")[0].count(b"/") != f"{PREFIX}{path}".count("/"):
             raise NotFound("There is nothing at this address.")  # it resolves to another path
-        sealed = self._sealed(call, url.raw_path.decode())
+        sealed = self._sealed(call, f"{owner.url}{url.raw_path.decode()}")
         request = httpx.Request(
             call.method, url, headers=[*call.headers, *sealed], content=call.body
         )
@@ -153,7 +155,7 @@ class Peers:
         target = f"{PREFIX}{call.target}"
         opening = connect(
             f"{owner.url.replace('http', 'ws', 1)}{target}",
-            additional_headers=[*call.headers, *self._sealed(call, target)],
+            additional_headers=[*call.headers, *self._sealed(call, f"{owner.url}{target}")],
             compression=None,
             user_agent_header=None,
             proxy=None,
@@ -184,11 +186,11 @@ class Peers:
         finally:
             task.cancel()
 
-    def _sealed(self, call: Call, target: str) -> list[tuple[str, str]]:
+    def _sealed(self, call: Call, url: str) -> list[tuple[str, str]]:
         asking = caller()
         identity = None if asking is None else asking.identity
-        facts = RelayedFacts(identity, call.client, request_id() or "")
-        return self._seal.headers(call.method, target, call.body, facts)
+        facts = RelayedFacts(identity, call.client, request_id() or "", call.is_inner)
+        return self._seal.headers(call.method, url, call.body, facts)
 
 
 def _require_taken(status: int, challenge: str) -> None:

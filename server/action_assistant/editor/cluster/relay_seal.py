@@ -2,8 +2,8 @@
 
 A relayed request carries, in the header X-Relayed, who asks and from where, as the editor at which it came in has
 verified it. The header Authorization holds `Relay TIME.NONCE.MAC`: an HMAC under a key that follows from the
-server's token, over method, target, digest of the body, these facts, time and nonce. Each counts once, within
-half a minute.
+server's token, over method, URL at the editor that is asked, digest of the body, these facts, time and nonce.
+Each counts once, within half a minute.
 """
 
 import base64
@@ -30,11 +30,13 @@ _REFUSED: Final = "This is no request of another editor of this server."
 
 class RelayedFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     """The facts of a request that the editor at which it came in has verified. `identity`: who asks; None for work of the
-    server itself. `client`: the address of the client, as limits count it. `request`: the request id."""
+    server itself. `client`: the address of the client, as limits count it. `request`: the request id. `is_inner`: the
+    editor itself asks a room, and passes on no request of a client."""
 
     identity: Identity | None = None
     client: str = ""
     request: str = ""
+    is_inner: bool = False
 
 
 class RelaySeal:
@@ -47,28 +49,28 @@ class RelaySeal:
         self._in_order: deque[tuple[float, str]] = deque()
 
     def headers(
-        self, method: str, target: str, body: bytes, facts: RelayedFacts
+        self, method: str, url: str, body: bytes, facts: RelayedFacts
     ) -> list[tuple[str, str]]:
-        """Return the header fields with which a request may be relayed once. `target`: its path at the
-        other editor, with the query."""
+        """Return the header fields with which a request may be relayed once. `url`: where it goes, with path
+        and query."""
         said = base64.urlsafe_b64encode(msgspec.json.encode(facts)).decode()
         digest = hashlib.sha256(body).hexdigest()
         at, nonce = f"{self._clock():.3f}", secrets.token_hex(16)
-        mac = self._mac(method, target, digest, said, at, nonce)
+        mac = self._mac(method, url, digest, said, at, nonce)
         return [
             ("authorization", f"{SCHEME} {at}/{nonce}/{mac}"),
             (FACTS, said),
             (DIGEST, digest),
         ]
 
-    def verified(self, method: str, target: str, headers: Mapping[str, str]) -> RelayedFacts:
+    def verified(self, method: str, url: str, headers: Mapping[str, str]) -> RelayedFacts:
         """Return the facts of a relayed request, whose nonce is used up by that. The caller has to compare
         the body with the digest. Raise Unauthenticated unless another editor has sealed it just now."""
         scheme, _, proof = headers.get("authorization", "").partition(" ")
         at, _, rest = proof.partition("/")
         nonce, _, mac = rest.partition("/")
         said, digest = headers.get(FACTS, ""), headers.get(DIGEST, "")
-        expected = self._mac(method, target, digest, said, at, nonce)
+        expected = self._mac(method, url, digest, said, at, nonce)
         is_ours = hmac.compare_digest(expected.encode(), mac.encode(errors="replace"))
         if scheme != SCHEME or not is_ours:
             raise Unauthenticated(_REFUSED)

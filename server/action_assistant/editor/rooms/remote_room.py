@@ -50,7 +50,7 @@ class RemoteRoom:
     async def submit(self, update: bytes, author: str, expected: int | None = None) -> int:
         """Do what `Room.submit` does. Raise OutcomeUnknown, too, if the answer was lost."""
         query = {"author": author} | ({} if expected is None else {"expected": str(expected)})
-        call = Call("POST", f"{self._target}?{urlencode(query)}", (), update)
+        call = Call("POST", f"{self._target}?{urlencode(query)}", body=update, is_inner=True)
         _, body = await self._ask(call)
         self.seq = msgspec.json.decode(body, type=SubmittedSeq).seq
         return self.seq
@@ -65,7 +65,7 @@ class RemoteRoom:
 
     async def now(self) -> DocumentState:
         """Return the document and the number of its last change, as `Room.now` does."""
-        headers, state = await self._ask(Call("GET", self._target))
+        headers, state = await self._ask(Call("GET", self._target, is_inner=True))
         self.seq = int(headers[SEQ])
         return DocumentState(self.seq, state)
 
