@@ -46,7 +46,20 @@ def star(count: int) -> Body:
     return {"graph_name": "g", "actions": actions, "graph_entry": many, "graph_exit": many}
 
 
-async def longest_silence(editor: Editor, step: Callable[[], Any]) -> tuple[float, float]:
+async def assert_answers_during(editor: Editor, step: Callable[[], Any]) -> None:
+    """Assert that the editor's longest silence is less than a third of what a step takes.
+
+    A machine with other work adds silences of its own, but not to each of three tries; a step
+    that holds the editor up does so each time.
+    """
+    for left in (2, 1, 0):
+        longest, took = await _longest_silence(editor, step)
+        if longest < took / 3 or not left:
+            assert longest < took / 3
+            return
+
+
+async def _longest_silence(editor: Editor, step: Callable[[], Any]) -> tuple[float, float]:
     """Return the editor's longest silence during a step, and the duration of the step, in
     seconds."""
     longest = 0.0
@@ -85,8 +98,7 @@ async def test_a_large_file_holds_nobody_up(editor: Editor, path: str, body: Bod
 
     await asyncio.to_thread(httpx.get, f"{editor.url}/api/graphs", headers=BEARER, trust_env=False)
     await bring()  # somebody is there to do it
-    longest, took = await longest_silence(editor, bring)
-    assert longest < took / 3
+    await assert_answers_during(editor, bring)
 
 
 @pytest.mark.parametrize("way", [importing.imported, importing.preview, importing.pieces])
@@ -234,8 +246,7 @@ async def test_an_update_that_would_hold_the_process_up_is_refused_to_its_sender
                 ended = await closed(session, 60)
         assert ended == messages.TOO_BIG
 
-    longest, took = await longest_silence(editor, bring)
-    assert longest < took / 3
+    await assert_answers_during(editor, bring)
     patched = await asyncio.to_thread(http.patch, f"/api/graphs/{graph}", json={"name": "goes on"})
     assert patched.status_code == 200
 
