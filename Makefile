@@ -113,7 +113,7 @@ unit-server: setup ## the tests of the server
 	@echo "» pytest"
 	@# One reads all tests and keeps what pytest makes of them, or each process would make it for itself.
 	@$(KEEPING) $(BIN)/pytest -q --collect-only $(STRUCTURE:%=--ignore=%) $(PYTEST) > /dev/null 2>&1 || true
-	@$(KEEPING) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(STRUCTURE:%=--ignore=%) $(PYTEST)
+	@$(KEEPING) scripts/retry-alone .pytest_cache $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(STRUCTURE:%=--ignore=%) $(PYTEST)
 
 .PHONY: unit-page
 unit-page: setup ## the tests of the pure parts of the page
@@ -129,7 +129,7 @@ ros-test: $(ROS_HALVES) ## tests over real rclpy, on loopback
 $(ROS_HALVES): ros-test-%: ros
 	@echo "» pytest over rclpy, $*"
 	@# 5: with PYTEST="-k …" this half may have no test.
-	@$(BARE) $(ROS)/python -m pytest -q tests/ros/test_[$*]*.py $(PYTEST) || test "$$?$(if $(PYTEST),,!)" = 5
+	@$(BARE) scripts/retry-alone .pytest_cache/$@ $(ROS)/python -m pytest -q tests/ros/test_[$*]*.py $(PYTEST) || test "$$?$(if $(PYTEST),,!)" = 5
 
 .PHONY: contract
 contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0] [RMW=…] [ACTION=…]; it moves
