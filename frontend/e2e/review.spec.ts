@@ -1,7 +1,7 @@
 /** Looking back: find a run, replay it, compare it with another, run it again with a fault. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, frames } from "./canvas";
+import { atRest, boxOf, card, frames } from "./canvas";
 import { type Person, Product } from "./product";
 
 interface Run {
@@ -47,6 +47,13 @@ async function ran(behaviours: Record<string, unknown[]>, of = graph): Promise<R
   const now = () => product.ask<Run>(`/api/runs/${run.id}`, {}, product.runnerUrl);
   await expect.poll(async () => (await now()).state, { timeout: 20_000 }).toMatch(/finished|error/);
   return now();
+}
+
+type Box = { x: number; y: number; width: number; height: number };
+
+function overlap(a: Box, b: Box): boolean {
+  const inside = a.x < b.x + b.width && b.x < a.x + a.width;
+  return inside && a.y < b.y + b.height && b.y < a.y + a.height;
 }
 
 /** The words on the cards, in their order on the canvas. */
@@ -189,6 +196,34 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
   );
   await page.getByRole("tab", { name: "Step by step" }).click();
   await expect(page.getByRole("row", { name: /Wait 1/ })).toContainText("here they part");
+});
+
+test("on a phone nothing that marks the parting lies over a card, a time or the edge", async () => {
+  const { page } = ada;
+  const graphs = await product.ask<{ id: string; name: string }[]>("/api/graphs");
+  const valve = graphs.find(({ name }) => name === "valve_inspection")?.id ?? "";
+  const first = await ran({ "*": [QUICK] }, valve);
+  const open = [{ after_s: 0.4, result: "on_false" }, QUICK];
+  const second = await ran({ "*": [QUICK], IsValveClosed: open }, valve);
+  const desktop = page.viewportSize() ?? { width: 1440, height: 900 };
+  for (const width of [390, 360]) {
+    await page.setViewportSize({ width, height: 844 });
+    await page.goto(`${product.url}/runs/compare?a=${first.id}&b=${second.id}`);
+    const parted = card(page, "IsValveClosed");
+    await expect(parted.getByText(/^1/).first()).toBeVisible();
+    await atRest(page);
+    const flag = await boxOf(parted.getByText(/^1/).first());
+    for (const name of ["DriveTo", "CloseValve", "SendReport", "CallOperator"])
+      expect(overlap(flag, await boxOf(card(page, name)))).toBe(false);
+    const lanes = page.getByRole("region", { name: "Both runs over time" });
+    const mark = await boxOf(lanes.getByText(/^1 · /));
+    for (const run of [first, second])
+      expect(overlap(mark, await boxOf(lanes.getByText(`run ${run.number}`)))).toBe(false);
+    const axis = lanes.getByText(/^[\d.]+ s$/).last();
+    for (const each of [mark, await boxOf(axis)])
+      expect(each.x + each.width).toBeLessThanOrEqual(width);
+  }
+  await page.setViewportSize(desktop);
 });
 
 test("new runs wait behind a pill, so that nothing moves under the finger", async () => {
@@ -349,6 +384,18 @@ test("statistics tell how often it succeeds and which action fails", async () =>
   await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
   await expect(page.getByRole("row", { name: /Wait 1/ })).toBeVisible();
   await expect(page.getByText(/Wait 1.*visits|1 of \d+ visits/).first()).toBeVisible();
+});
+
+test("statistics of no graph ask for one, and then name it", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/statistics`);
+  await expect(page.getByRole("heading", { name: "Of which graph?" })).toBeVisible();
+  const choice = page.getByRole("combobox", { name: "Graph" });
+  await choice.click();
+  const { name } = await product.ask<{ name: string }>(`/api/graphs/${graph}`);
+  await page.getByRole("option", { name, exact: true }).click();
+  await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
+  await expect(choice).toHaveValue(name);
 });
 
 test("a part of the time is looked at more closely, and a link carries it", async ({ browser }) => {

@@ -95,7 +95,7 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
         <span className={style.rows}>
           {aid === parting && (
             <span className={style.flag}>
-              1 · first difference{found.parting?.step.levels.length ? ", inside" : ""}
+              1<span> · first difference{found.parting?.step.levels.length ? ", inside" : ""}</span>
             </span>
           )}
           <RunRow number={found.b.number} ghost={false} summary={action?.b ?? null} />

@@ -1,5 +1,5 @@
 /** Two runs on one time axis: this run filled, the other one as a ghost beneath, and where they part. */
-import { useMemo, useState } from "react";
+import { type CSSProperties, useMemo, useState } from "react";
 import type { ComparedStep, Comparison } from "../api/review";
 import type { Run, Visit } from "../api/runs";
 import { spokenName } from "../graph/spoken-name";
@@ -191,12 +191,12 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
       <div className={style.head} aria-hidden>
         <div className={style.ruler}>
           {ticksOf({ start: 0, span }).map((t) => (
-            <span className="absolute nowrap" key={t} style={{ left: percent(t / span) }}>
+            <span key={t} style={{ "--at": t / span } as CSSProperties}>
               {t < 60_000 ? `${t / 1000} s` : duration(t)}
             </span>
           ))}
           {parts !== null && (
-            <b style={{ left: percent(shareOf({ start: 0, span }, parts)) }}>
+            <b style={{ "--at": shareOf({ start: 0, span }, parts) } as CSSProperties}>
               1 · {duration(parts)}
             </b>
           )}

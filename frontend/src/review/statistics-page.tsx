@@ -1,8 +1,9 @@
 /** Many runs of one graph: how often it succeeds, where the time goes, what fails, what never ran. */
-import { Skeleton } from "@mantine/core";
+import { Select, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconChartBar } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { Link, useSearch } from "wouter";
+import { Link, useLocation, useSearch } from "wouter";
+import { useGraphNames } from "../api/graph-list";
 import { errorText } from "../api/http";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";
@@ -281,6 +282,28 @@ function Found({ found }: { found: Statistics }) {
   );
 }
 
+/** Names the graph whose runs are counted, and lets a person choose another one. */
+function GraphChoice({ graph }: { graph: string }) {
+  const [, go] = useLocation();
+  const names = useGraphNames();
+  const known = (names.data ?? []).map(({ id, name }) => ({ value: id, label: name }));
+  const strange = names.isPending ? "…" : "A graph that is not in the list";
+  const isKnown = graph === "" || known.some(({ value }) => value === graph);
+  return (
+    <Select
+      aria-label="Graph"
+      placeholder={names.data?.length === 0 ? "No graph yet" : "Choose a graph"}
+      data={isKnown ? known : [...known, { value: graph, label: strange }]}
+      searchable
+      allowDeselect={false}
+      maw="22rem"
+      w="100%"
+      value={graph || null}
+      onChange={(id) => id && go(`/runs/statistics?${new URLSearchParams({ graph: id })}`)}
+    />
+  );
+}
+
 export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
   const graph = new URLSearchParams(useSearch()).get("graph") ?? "";
   const { runner, choice } = useSiteChoice();
@@ -289,7 +312,20 @@ export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode
     <>
       {bar({ crumbs: [{ label: "Runs", to: "/runs" }, { label: "Statistics" }] })}
       <main className="page">
-        {choice && <div className={style.inner}>{choice}</div>}
+        {graph === "" ? (
+          <Empty
+            icon={<IconChartBar size={22} />}
+            title="Of which graph?"
+            action={<GraphChoice graph="" />}
+          >
+            How often its runs succeed, where their time goes, and which action fails.
+          </Empty>
+        ) : (
+          <div className={style.head}>
+            <GraphChoice graph={graph} />
+            {choice}
+          </div>
+        )}
         {found.isLoading && (
           <div className={style.inner} aria-busy="true">
             <Skeleton height={110} mb={12} />
