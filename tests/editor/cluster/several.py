@@ -10,7 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
+from sqlalchemy.dialects.postgresql import insert
 
+from action_assistant.journal.chain import START
+from action_assistant.journal.journal import Journal
+from action_assistant.schema.editor_tables import editor_head
 from editor.process import Editor
 from support.product import TOKEN, free_ports
 
@@ -103,3 +107,10 @@ def started(editors: list[OneOfSeveral]) -> Iterator[None]:
         for each in editors:
             if each._child is not None and each._child.poll() is None:
                 each.kill()
+
+
+async def have_begun(journal: Journal, *streams: str) -> None:
+    """Let these streams exist, without an event."""
+    rows = [{"stream": each, "seq": 0, "chain": START, "epoch": 0} for each in streams]
+    made = insert(editor_head).values(rows).on_conflict_do_nothing()
+    await journal.derive(lambda connection: connection.execute(made))

@@ -20,6 +20,7 @@ from action_assistant.errors import CannotStart, Conflict, Unavailable
 from action_assistant.journal.events import Addition, Draft, Event, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.slots import Cursor, before_first, slot_of
+from editor.cluster.several import have_begun
 from journal.servers import Server
 
 SCHEDULES: Final = int(os.environ.get("SOAK_SCHEDULES", "1"))
@@ -89,6 +90,7 @@ def live(url: str, name: str, out: Path) -> None:
         else:
             return
         with contextlib.suppress(Unavailable):
+            await have_begun(journal, *_STREAMS)
             async with SharedOwners.joined(journal, url, f"http://{name}") as owners:
                 await Writer(journal, owners, name, out).write(ended)
         await journal.close()

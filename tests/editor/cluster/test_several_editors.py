@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import httpx_ws
 import pytest
 from pycrdt import (
     Doc,
@@ -151,6 +152,30 @@ def test_an_action_of_the_library_is_changed_in_graphs_that_other_editors_have_o
         assert asked(each, "GET", f"/api/graphs/{graph}")["description"] == "of the draft"
         assert asked(each, "GET", f"/api/actions/{action}/umrf")
         assert asked(each, "GET", f"/api/graphs/{graph}/history")
+
+
+async def test_asking_for_graphs_that_do_not_exist_leaves_nothing(
+    editors: list[OneOfSeveral], postgres: Server
+) -> None:
+    def rows() -> list[str]:
+        name = editors[0].database.rpartition("/")[2]
+        made_up = "stream LIKE 'graph/made-up-%'"
+        return [
+            postgres.ask(f"SELECT count(*) FROM {table} WHERE {made_up}", name)
+            for table in ("head", "room", "event")
+        ]
+
+    for n in range(6):
+        editor, path = editors[n % 3], f"/api/graphs/made-up-{n}"
+        with editor.client() as client:
+            assert client.get(path).status_code == 404
+            assert client.patch(path, json={"name": "new"}).status_code == 404
+            assert client.get(f"/api/actions/made-up-{n}/umrf").status_code == 404
+        with pytest.raises(httpx_ws.WebSocketUpgradeError) as refused:
+            async with editor.socket(f"made-up-{n}"):
+                pass
+        assert refused.value.response.status_code == 404
+    assert rows() == ["0", "0", "0"]
 
 
 class Stubborn:

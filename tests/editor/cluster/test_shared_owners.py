@@ -6,11 +6,12 @@ from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
 
-from action_assistant.editor.cluster.owners import Elsewhere, Here
+from action_assistant.editor.cluster.owners import Elsewhere, Here, Nobody
 from action_assistant.editor.cluster.shared_owners import SharedOwners
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import Addition, Draft, nothing
 from action_assistant.journal.journal import Journal
+from editor.cluster.several import have_begun
 from journal.servers import Server
 
 STREAM = "graph/g"
@@ -46,6 +47,7 @@ class Editor:
 async def editor(url: str, name: str) -> AsyncIterator[Editor]:
     journal = await Journal.open(url, branch="editor", fold=nothing, several=True)
     try:
+        await have_begun(journal, STREAM, "graph/other", *(f"graph/{n}" for n in range(20)))
         async with SharedOwners.joined(journal, url, f"http://{name}") as owners:
             yield Editor(name, journal, owners)
     finally:
@@ -101,6 +103,23 @@ async def test_of_two_who_take_a_stream_at_once_one_owns_it(
         assert found[0] == found[2]
         assert found[1] == found[3]
         assert sorted(type(each).__name__ for each in found[:2]) == ["Elsewhere", "Here"]
+
+
+async def test_a_stream_without_events_has_no_owner_and_leaves_nothing(
+    editors: tuple[Editor, Editor], postgres: Server
+) -> None:
+    one, two = editors
+    name = one.journal.address.rpartition("/")[2]
+    before = postgres.ask("SELECT count(*) FROM head", name)
+    for n in range(10):
+        assert await one.owners.owner(f"graph/made-up-{n}") == Nobody()
+        assert await two.owners.owner(f"graph/made-up-{n}") == Nobody()
+    assert postgres.ask("SELECT count(*) FROM head", name) == before
+    assert postgres.ask("SELECT count(*) FROM room", name) == "0"
+    event = Draft("thing.happened.v1", "ada", b"1")
+    await one.journal.append("graph/made-up-1", [event])
+    assert await two.epoch("graph/made-up-1") == 1
+    assert await one.owners.owner("graph/made-up-1") == Elsewhere("http://two", 1)
 
 
 async def test_an_editor_that_has_ended_leaves_its_streams_to_the_others(postgres: Server) -> None:

@@ -27,7 +27,11 @@ class Elsewhere(msgspec.Struct, frozen=True, gc=False):
     slot: int
 
 
-Owner: TypeAlias = Here | Elsewhere
+class Nobody(msgspec.Struct, frozen=True, gc=False):
+    """The stream has no owner, since it has no events: there is no such graph, and every editor may say so."""
+
+
+Owner: TypeAlias = Here | Elsewhere | Nobody
 
 
 class Owners(Protocol):
@@ -35,7 +39,8 @@ class Owners(Protocol):
 
     async def owner(self, stream: str) -> Owner:
         """Return the owner of a stream. If no living editor owns it, or its owner gives its rooms up, this
-        editor takes it. An answer Elsewhere is never cached: ask again if that editor does not answer.
+        editor takes it, if anything is stored in it. An answer Elsewhere is never cached: ask again if that
+        editor does not answer.
         Raise Unavailable if the database does not answer, or if this editor would have to take the
         stream while it is draining."""
 

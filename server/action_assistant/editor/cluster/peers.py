@@ -12,7 +12,7 @@ import httpx
 import websockets
 from websockets.asyncio.client import ClientConnection, connect
 
-from action_assistant.editor.cluster.owners import Elsewhere, Here, Owners
+from action_assistant.editor.cluster.owners import Elsewhere, Owners
 from action_assistant.editor.cluster.relay_seal import SCHEME, RelayedFacts, RelaySeal
 from action_assistant.errors import NotFound, OutcomeUnknown, Unavailable
 from action_assistant.logs import request_id
@@ -86,7 +86,7 @@ class Peers:
     @asynccontextmanager
     async def answer(self, stream: str, call: Call) -> AsyncIterator[httpx.Response | None]:
         """Return a context with the answer of the owner of a stream to a request, whose body was not read
-        yet; None if the owner is this editor by now. Raise Unavailable if no owner answers, OutcomeUnknown
+        yet; None if no other editor owns it by now. Raise Unavailable if no owner answers, OutcomeUnknown
         if it may have done what was asked."""
         answer = await self._tried(
             stream, lambda owner: self._send(stream, owner, call), call.method
@@ -98,7 +98,7 @@ class Peers:
                 await answer.aclose()
 
     async def socket(self, stream: str, call: Call) -> "OpenSocket | Refusal | None":
-        """Open a WebSocket at the owner of a stream. Return None if the owner is this editor by now, or
+        """Open a WebSocket at the owner of a stream. Return None if no other editor owns it by now, or
         the owner's refusal. Raise Unavailable if no owner answers."""
         return await self._tried(stream, lambda owner: self._connect(stream, owner, call), "GET")
 
@@ -113,7 +113,7 @@ class Peers:
         for failed in range(_TRIES):
             await asyncio.sleep(failed * _PAUSE_S)
             owner = await self._owners.owner(stream)
-            if isinstance(owner, Here):
+            if not isinstance(owner, Elsewhere):
                 return None
             try:
                 return await ask(owner)

@@ -85,7 +85,7 @@ class Relay:
         body = await whole_body(receive)
         call = _call_of(scope, scope["method"], body)
         async with self._peers().answer(stream, call) as answer:
-            if answer is None:  # this editor owns it by now
+            if answer is None:  # it can be answered here by now
                 await self._app(scope, Replayed(body, receive), send)
                 return
             passing = asyncio.create_task(_pass_answer(answer, send))

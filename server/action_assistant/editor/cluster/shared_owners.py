@@ -17,7 +17,8 @@ from typing import Any, Final
 from sqlalchemy import Connection, text
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 
-from action_assistant.editor.cluster.owners import Elsewhere, Here, Owner
+from action_assistant.editor.cluster.chores import CHORES
+from action_assistant.editor.cluster.owners import Elsewhere, Here, Nobody, Owner
 from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import START
 from action_assistant.journal.database import cause_of
@@ -47,10 +48,8 @@ _LOOK: Final = text(
     f"SELECT r.life, r.epoch, e.slot, e.url, coalesce({_LIVES}, false) AS lives"
     " FROM room r LEFT JOIN editor e ON e.life = r.life WHERE r.stream = :stream"
 )
-_RAISE: Final = text(
-    "INSERT INTO head (stream, seq, chain, epoch) VALUES (:stream, 0, :start, 1)"
-    " ON CONFLICT (stream) DO UPDATE SET epoch = head.epoch + 1 RETURNING epoch"
-)
+#: Nothing is returned for a stream without events: whoever asks for a graph that does not exist leaves nothing.
+_RAISE: Final = text("UPDATE head SET epoch = epoch + 1 WHERE stream = :stream RETURNING epoch")
 #: Nothing is returned if another editor was faster.
 _SHOW: Final = text(
     f"INSERT INTO room AS r (stream, life, epoch, since) VALUES (:stream, :life, :epoch, {_NOW})"
@@ -72,6 +71,9 @@ _CLAIM: Final = (
         f" VALUES (:slot, :life, :url, :version, {_NOW}) ON CONFLICT (slot) DO UPDATE"
         " SET life = excluded.life, url = excluded.url, version = excluded.version,"
         " beat_at = excluded.beat_at, draining_at = NULL"
+    ),
+    text(
+        "INSERT INTO head (stream, seq, chain) VALUES (:chores, 0, :start) ON CONFLICT DO NOTHING"
     ),
 )
 _DRAIN: Final = text(f"UPDATE editor SET draining_at = {_NOW} WHERE life = :life")
@@ -188,9 +190,10 @@ class SharedOwners:
             return Elsewhere(row.url, row.slot)
         if self._draining:
             raise Unavailable(_DRAINING)
-        values: dict[str, Any] = {"stream": stream, "start": START}
-        epoch: int = (await connection.execute(_RAISE, values)).scalar_one()
-        values = {"stream": stream, "life": self._life, "epoch": epoch}
+        epoch = (await connection.execute(_RAISE, {"stream": stream})).scalar()
+        if epoch is None:
+            return Nobody()
+        values: dict[str, Any] = {"stream": stream, "life": self._life, "epoch": epoch}
         values |= {"old_life": None, "old_epoch": None}
         if row is not None:
             values |= {"old_life": row.life, "old_epoch": row.epoch}
@@ -218,7 +221,7 @@ class SharedOwners:
 
         def register(connection: Connection) -> None:
             values: dict[str, Any] = {"life": self._life, "slot": self._journal.slot}
-            values |= {"url": self._url, "version": VERSION}
+            values |= {"url": self._url, "version": VERSION, "chores": CHORES, "start": START}
             for statement in _CLAIM:
                 connection.execute(statement, values)
             if self._draining:

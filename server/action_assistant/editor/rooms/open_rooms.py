@@ -5,12 +5,13 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import TYPE_CHECKING, Final
 
-from action_assistant.editor.cluster.owners import Alone, Elsewhere, Here, Owner, Owners
+from action_assistant.editor.cluster.owners import Alone, Elsewhere, Here, Nobody, Owner, Owners
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
+from action_assistant.editor.log.graph_events import graph_of
 from action_assistant.editor.rooms.batch import LONGEST, BatchWindow
 from action_assistant.editor.rooms.room import Room, RoomMetrics
-from action_assistant.errors import Unavailable
+from action_assistant.errors import NotFound, Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.caller import outlive_connection
 from action_assistant.web.auth.identity import Identity
@@ -71,7 +72,8 @@ class Rooms:
     @asynccontextmanager
     async def enter(self, stream: str) -> AsyncIterator[Room]:
         """Return a context with the room of a stream, which is loaded if needed and stays loaded
-        during it. Raise Unavailable if it cannot be loaded, or if another editor owns the stream."""
+        during it. Raise Unavailable if it cannot be loaded, or if another editor owns the stream,
+        NotFound if several editors share the database and it has no such stream."""
         with self._held(stream):
             yield await self._room(stream)
 
@@ -80,7 +82,7 @@ class Rooms:
         """Return a context with the room of a stream for edits of the server itself, wherever it is open.
         Raise Unavailable if it cannot be loaded or its editor does not answer."""
         with self._held(stream):
-            if self._peers is None or isinstance(await self._owners.owner(stream), Here):
+            if self._peers is None or not isinstance(await self._owners.owner(stream), Elsewhere):
                 yield await self._room(stream)
                 return
         from action_assistant.editor.rooms.remote_room import RemoteRoom
@@ -226,6 +228,8 @@ class Rooms:
                     pass
                 case Elsewhere():
                     raise Unavailable(_ELSEWHERE)
+                case Nobody():
+                    raise NotFound(f"There is no graph {graph_of(stream)!r}.")
             loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
             room = self._rooms[stream] = Room(
                 stream,
