@@ -1,6 +1,6 @@
 /** Requests about past runs: marks, comparisons, statistics, files, and the replay of a run. */
 import { useQuery } from "@tanstack/react-query";
-import { runnerAt } from "./client";
+import { runnerAt, runnerOnlyAt } from "./client";
 import { fetchAnswer, type RequestOptions } from "./http";
 import { getRun } from "./run-stop";
 import type { Inside, Run } from "./runs";
@@ -84,10 +84,27 @@ export function listRuns(
   limit: number,
   signal?: AbortSignal,
 ): Promise<ListedRun[]> {
+  return runnerAt(runner).get("/api/runs", { query: pageOf(filter, before, limit), signal });
+}
+
+function pageOf(filter: RunFilter, before: string | null, limit: number): URLSearchParams {
   const query = queryOf(filter);
   query.set("limit", String(limit));
   if (before !== null) query.set("before", before);
-  return runnerAt(runner).get("/api/runs", { query, signal });
+  return query;
+}
+
+/** Return the newest runs of a graph, or those before `before`, at the runner of a run, which compares no others. */
+export function listComparable(
+  runner: string,
+  run: string,
+  graph: string,
+  before: string | null,
+  limit: number,
+  signal: AbortSignal,
+): Promise<ListedRun[]> {
+  const query = pageOf({ ...NO_FILTER, graph }, before, limit);
+  return runnerOnlyAt(runnerOfRun(runner, run)).get("/api/runs", { query, signal });
 }
 
 /** Asks for the causes of the end of a run that needs an explanation, again when its state changes. */

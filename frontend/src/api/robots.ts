@@ -46,11 +46,11 @@ export function useRosReach(runner: string | undefined) {
   });
 }
 
-/** Engines in sight. While discovery goes on it is asked again soon, and says for how long others may still come. */
+/** Engines in sight of one runner. While discovery goes on it is asked again soon, and says for how long others may still come. */
 export function useFoundEngines(runner: string | undefined, on: boolean) {
   return useQuery({
-    queryKey: ["robots", "candidates"],
-    queryFn: ({ signal }) => runnerAt(runner).get("/api/candidates/now", { signal }),
+    queryKey: ["robots", "candidates", runner],
+    queryFn: ({ signal }) => runnerOnlyAt(runner ?? "").get("/api/candidates/now", { signal }),
     enabled: on && runner !== undefined,
     refetchInterval: ({ state }) => ((state.data?.left_s ?? 0) > 0 ? 500 : 5_000),
   });

@@ -1,6 +1,7 @@
 /** Which site a request goes to, and how the answers of several become one. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { runnerAt } from "./client";
+import { listComparable } from "./review";
 import { registerRobot } from "./robots";
 import { setKnowledge } from "./site-knowledge";
 import { siteRouter } from "./site-requests";
@@ -236,4 +237,23 @@ test("a session that one site does not know any more has ended there", async () 
       : new Response(null, { status: 204 }),
   );
   await expect(runner.delete("/api/session", {})).resolves.toBeUndefined();
+});
+
+test("runs of two sites are not compared, and those that may be compared are asked of the run's site alone", async () => {
+  const compare = (a: string, b: string) => runner.get("/api/comparison", { query: { a, b } });
+  await expect(compare("ofA", "ofB")).rejects.toThrow(
+    "One run is of Hall A, the other of Hall B, and a runner knows only its own runs.",
+  );
+  expect(asked).toEqual([]);
+  answers = { "GET 8011": [] };
+  await compare("unknown", "ofB");
+  const { signal } = new AbortController();
+  await listComparable(A.url, "ofB", "g", "ofB", 1, signal);
+  answers = { "GET 8001": [] };
+  await listComparable(A.url, "ofA", "g", null, 200, signal);
+  expect(asked).toEqual([
+    "GET 8011/api/comparison?a=unknown&b=ofB",
+    "GET 8011/api/runs?graph=g&limit=1&before=ofB",
+    "GET 8001/api/runs?graph=g&limit=200",
+  ]);
 });

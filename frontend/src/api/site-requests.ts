@@ -42,7 +42,6 @@ const JOINED: Readonly<Record<string, readonly string[]>> = {
   "get /api/queue": ["entries", "robots"],
   "get /api/repeats": [],
   "get /api/rights": ["robots", "people"],
-  "get /api/candidates/now": ["engines"],
   "get /api/approvals": [],
   "get /api/approvals/asked": [],
   "get /api/expectations": [],
@@ -67,6 +66,7 @@ const askSites: SiteRouter["ask"] = async (route, sent, ask) => {
   if (TOLD.has(route)) return tellAll(allSites(), ask);
   if (route === "post /api/robots/{name}/stop") return stopRobot(String(sent.path?.name), ask);
   if (route === "get /api/runs") return listRuns(route, sent, ask);
+  if (route === "get /api/comparison") return comparison(sent, askNoting(ask));
   const lists = JOINED[route];
   if (lists !== undefined) return joined(await answersOf(route, lists, ask));
   if (route === "get /api/starts/{request_id}")
@@ -206,6 +206,17 @@ async function ofId(id: string, ask: AskSite): Promise<unknown> {
   const muted = mutedSites();
   const ready = allSites().filter((each) => !muted.includes(each));
   return firstThatHas([...ready, ...muted], ask, (found) => noteSite(id, found));
+}
+
+/** A runner compares runs of its own. Throws `Refusal` for runs of two sites. */
+async function comparison({ query }: UnsentRequest, ask: AskSite): Promise<unknown> {
+  const { a, b } = asRecord(query);
+  const [one, other] = [siteOfId(String(a)), siteOfId(String(b))];
+  if (one !== undefined && other !== undefined && one !== other)
+    throw refused(
+      `One run is of ${isolated(one.name)}, the other of ${isolated(other.name)}, and a runner knows only its own runs.`,
+    );
+  return one === undefined && other !== undefined ? ask(other) : ofId(String(a), ask);
 }
 
 /** A start that is not found is nowhere only if each site says so. */

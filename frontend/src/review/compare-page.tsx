@@ -8,13 +8,7 @@ import { errorText } from "../api/http";
 import { engineWords } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
-import {
-  type ComparedStep,
-  type Comparison,
-  listRuns,
-  NO_FILTER,
-  useComparison,
-} from "../api/review";
+import { type ComparedStep, type Comparison, listComparable, useComparison } from "../api/review";
 import { getRun } from "../api/run-stop";
 import { type Run, useRun, type Visit } from "../api/runs";
 import { DifferenceView } from "../differences/difference-view";
@@ -219,12 +213,12 @@ function Choose({ runner, b, asked }: { runner: string; b: string; asked: boolea
   const graph = second.data?.graph ?? second.data?.graph_name ?? "";
   const others = useQuery({
     queryKey: ["runs", "of", graph],
-    queryFn: ({ signal }) => listRuns(runner, { ...NO_FILTER, graph }, null, 200, signal),
+    queryFn: ({ signal }) => listComparable(runner, b, graph, null, 200, signal),
     enabled: graph !== "",
   });
   const before = useQuery({
     queryKey: ["runs", "before", graph, b],
-    queryFn: ({ signal }) => listRuns(runner, { ...NO_FILTER, graph }, b, 1, signal),
+    queryFn: ({ signal }) => listComparable(runner, b, graph, b, 1, signal),
     enabled: graph !== "" && !asked,
   });
   const first = before.data?.[0]?.id;

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
+import { type SiteRouter, setSiteRouter, setSites } from "../api/sites";
 import { courseOf } from "./course-bar";
-import { byDay, type RunOfList, runsBefore } from "./run-list";
+import { byDay, type RunOfList, runsBefore, unlikeChosen } from "./run-list";
 
 const NOW = Date.parse("2026-11-24T12:00:00");
 const DAY = 86_400_000;
@@ -68,4 +69,17 @@ test("a course shows the worst of what ran at a time, and what runs still", () =
     ["run", 15],
   ]);
   expect(courseOf({ actions, ended_at: at(60) }, 0, 60_000).at(-1)?.tone).toBe("unknown");
+});
+
+test("a run is compared with runs of its own site only", () => {
+  const sites = ["A", "B"].map((name) => ({ name: `Hall ${name}`, url: `http://${name}` }));
+  const siteOf = (id: string) => sites[id === "r3" ? 1 : 0];
+  setSites(sites);
+  setSiteRouter({ siteOfId: siteOf } as SiteRouter);
+  const runs = [run(4, "a"), run(3, "a"), run(2, "a")];
+  expect([...runsBefore(runs)].map(([later, { id }]) => [later, id])).toEqual([["r4", "r2"]]);
+  expect(unlikeChosen("r3", ["r4"])).toContain("Hall A");
+  expect([unlikeChosen("r2", ["r4"]), unlikeChosen("r3", [])]).toEqual(["", ""]);
+  setSiteRouter(undefined);
+  setSites([]);
 });

@@ -50,10 +50,10 @@ export function runsBefore(runs: readonly RunOfList[]): ReadonlyMap<string, RunO
   const later = new Map<string, RunOfList>();
   for (const run of runs) {
     if (run.hidden === true) continue;
-    const graph = run.graph ?? run.graph_name;
-    const next = later.get(graph);
+    const key = `${run.graph ?? run.graph_name} ${siteOfId(run.id)?.url}`; // a site compares its own
+    const next = later.get(key);
     if (next !== undefined) before.set(next.id, run);
-    later.set(graph, run);
+    later.set(key, run);
   }
   return before;
 }
@@ -120,16 +120,26 @@ const siteName = (run: string) => {
   return site ? ` · ${isolated(site.name)}` : "";
 };
 
+/** Return why a run cannot be compared with the chosen ones; "" if it can. */
+export function unlikeChosen(run: string, chosen: readonly string[]): string {
+  const site = siteOfId(run);
+  const other = chosen.map(siteOfId).find((each) => each !== site);
+  if (other === undefined || site === undefined) return "";
+  return `The chosen run is of ${isolated(other.name)}: only runs of one site can be compared.`;
+}
+
 interface RunRowProps {
   run: RunOfList;
   now: number;
   chosen: boolean;
+  /** Why it cannot be chosen; "" if it can. */
+  unlike: string;
   onChoose: (chosen: boolean) => void;
   /** Null: there is none. Undefined: it is not in the list. */
   before: RunOfList | null | undefined;
 }
 
-function Row({ run, now, chosen, onChoose, before }: RunRowProps) {
+function Row({ run, now, chosen, unlike, onChoose, before }: RunRowProps) {
   const [, go] = useLocation();
   const by = useCurrentName(run.author);
   const label = useVersionLabel(run);
@@ -147,7 +157,8 @@ function Row({ run, now, chosen, onChoose, before }: RunRowProps) {
           size="xs"
           aria-label={`Choose run ${run.number} to compare`}
           checked={chosen}
-          disabled={run.hidden === true}
+          disabled={run.hidden === true || unlike !== ""}
+          title={unlike === "" ? undefined : unlike}
           onChange={(event) => onChoose(event.currentTarget.checked)}
         />
       </td>
@@ -272,6 +283,7 @@ export function RunList({ runs, chosen, onChoose, isGapless, goesOn }: RowsProps
                 run={run}
                 now={now - shiftOfRun(run.id)}
                 chosen={chosen.includes(run.id)}
+                unlike={unlikeChosen(run.id, chosen)}
                 onChoose={(on) => onChoose(run.id, on)}
                 before={before.get(run.id) ?? (isLast ? null : undefined)}
               />

@@ -106,15 +106,16 @@ function Reach({ robot, errorOf, onChange }: ReachProps) {
   );
 }
 
-/** A registration in its form; `isNew`: the robot is not registered yet. */
+/** A registration in its form; `isNew`: the robot is not registered yet. `at`: the runner that has found its engine. */
 export interface EditedRobot {
   robot: Registration;
   isNew: boolean;
+  at?: string | undefined;
 }
 
 export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose: () => void }) {
   const { runner: anywhere } = useLive();
-  const { runner, choice } = useSiteChoice();
+  const { runner, choice } = useSiteChoice(editing.at);
   const client = useQueryClient();
   const [robot, setRobot] = useState(editing.robot);
   usePendingText(robot === editing.robot ? "" : JSON.stringify(robot), null);

@@ -16,9 +16,11 @@ import {
   useFoundEngines,
   useRosReach,
 } from "../api/robots";
+import type { Site } from "../api/sites";
 import { Empty } from "../ui/empty";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { counted } from "../words/counted";
+import { isolated } from "../words/isolated";
 import { RobotCard } from "./robot-card";
 import type { EditedRobot } from "./robot-form";
 import style from "./robots-page.module.css";
@@ -95,14 +97,10 @@ export function RobotsPage({ onImport }: Props) {
   const known = now.link !== "connecting" || reach !== undefined;
   const engines = now.engines.length > 0 ? now.engines : (reach?.engines ?? []);
   const robots = engines.filter((robot) => !robot.simulated);
-  const add = (robot: Registration = NEW) => setEditing({ robot, isNew: true });
-  const take = (candidate: FoundEngine) =>
-    add({
-      ...NEW,
-      name: candidate.actor,
-      domain: candidate.domain,
-      get_service: candidate.get_service,
-    });
+  const take = (candidate: FoundEngine, at: string) => {
+    const { actor: name, domain, get_service } = candidate;
+    setEditing({ robot: { ...NEW, name, domain, get_service }, isNew: true, at });
+  };
   const isPractising = robots.some(({ name }) => name === PRACTICE);
   const canPractise = may && reach?.no_reach === "" && !isPractising;
   const button = (
@@ -111,7 +109,7 @@ export function RobotsPage({ onImport }: Props) {
       leftSection={<IconPlus size={16} aria-hidden />}
       disabled={!may}
       title={may ? undefined : "Operators register robots"}
-      onClick={() => add()}
+      onClick={() => setEditing({ robot: NEW, isNew: true })}
     >
       Register a robot
     </Button>
@@ -166,7 +164,10 @@ export function RobotsPage({ onImport }: Props) {
               ))}
           </Fragment>
         ))}
-        <FoundEngines may={may} onTake={take} on={reach?.no_reach === ""} />
+        {runner !== undefined &&
+          (now.sites?.map(({ site }) => site) ?? [{ name: "", url: runner }])
+            .filter(({ isUnlisted }) => !isUnlisted)
+            .map((site) => <FoundEngines key={site.url} site={site} may={may} onTake={take} />)}
       </div>
       <OverlayBoundary>
         {editing && <RobotForm editing={editing} onClose={() => setEditing(null)} />}
@@ -176,9 +177,10 @@ export function RobotsPage({ onImport }: Props) {
 }
 
 interface FoundEnginesProps {
+  /** Its name is "" with one runner. */
+  site: Site;
   may: boolean;
-  on: boolean;
-  onTake: (candidate: FoundEngine) => void;
+  onTake: (candidate: FoundEngine, runner: string) => void;
 }
 
 function words(candidate: FoundEngine): string {
@@ -188,16 +190,19 @@ function words(candidate: FoundEngine): string {
   return "heard by its feedback";
 }
 
-export function FoundEngines({ may, on, onTake }: FoundEnginesProps) {
-  const { runner } = useLive();
-  const { data } = useFoundEngines(runner, on);
+/** Engines that the runner of a site has found, which is to lead them. */
+function FoundEngines({ site, may, onTake }: FoundEnginesProps) {
+  const reach = useRosReach(site.url).data;
+  const { data } = useFoundEngines(site.url, reach?.no_reach === "");
   const found = data?.engines ?? [];
   const looking = (data?.left_s ?? 0) > 0;
   if (found.length === 0 && !looking) return null;
+  const where = site.name === "" ? "" : ` of ${isolated(site.name)}`;
+  const title = `In sight${where}, not registered`;
   return (
-    <section className={style.section} aria-label="In sight, not registered">
+    <section className={style.section} aria-label={title}>
       <h3 className={style.foundEnginesTitle}>
-        <IconRadar2 size={16} aria-hidden /> In sight, not registered
+        <IconRadar2 size={16} aria-hidden /> {title}
       </h3>
       {looking && (
         <p className="quiet-xs" role="status">
@@ -212,7 +217,7 @@ export function FoundEngines({ may, on, onTake }: FoundEnginesProps) {
               domain {each.domain} · {each.get_service} · {words(each)}
             </span>
             <span className="flex-1" />
-            <Button size="compact-sm" disabled={!may} onClick={() => onTake(each)}>
+            <Button size="compact-sm" disabled={!may} onClick={() => onTake(each, site.url)}>
               Register{each.actor === "" ? " …" : ""}
             </Button>
           </li>

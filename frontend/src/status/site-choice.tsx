@@ -3,18 +3,17 @@ import { NativeSelect } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 import { useLive } from "../api/page-link";
 
-/** Return the chosen runner, at first that of the first site, and what chooses it. */
-export function useSiteChoice(disabled = false): {
+/** Return the chosen runner, at first `at`, else that of the first site, and what chooses it. */
+export function useSiteChoice(at?: string): {
   runner: string | undefined;
   choice: ReactNode;
 } {
   const { runner, now } = useLive();
-  const [chosen, choose] = useState<string>();
+  const [chosen, choose] = useState(at);
   const choice = now.sites && (
     <NativeSelect
       label="Site"
       w="fit-content"
-      disabled={disabled}
       data={now.sites.map(({ site }) => ({ value: site.url, label: site.name }))}
       value={chosen ?? runner ?? ""}
       onChange={(event) => choose(event.currentTarget.value)}
