@@ -79,7 +79,8 @@ class WriterSession(Protocol):
         has taken it; nothing is written then."""
 
     def hold(self, streams: Sequence[str]) -> None:
-        """Begin a transaction in which no other process moves these streams."""
+        """Lock these streams in the open transaction: no other process appends to them until it ends. A
+        database with only one writer needs no such lock, and does nothing."""
 
     def abandon(self) -> None:
         """Roll the transaction back that is open, if there is one."""

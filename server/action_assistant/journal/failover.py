@@ -42,8 +42,8 @@ class NoPrimary(OSError):
 
 
 class Primary(NamedTuple):
-    """The facts that a primary tells about itself. `standbys`: its setting `synchronous_standby_names`; `identifier`:
-    of its cluster; `timeline`: rises with each server that takes over."""
+    """The facts that a primary tells about itself. `standbys`: its setting `synchronous_standby_names`;
+    `identifier`: of its cluster; `timeline`: rises with each server that takes over."""
 
     standbys: str
     identifier: str
@@ -66,8 +66,8 @@ class Failover:
         self._newest: dict[str, int] = {}  # timeline, by the identifier of a cluster
 
     def note(self, identifier: str, timeline: int) -> None:
-        """Remember that a server of this cluster has begun this timeline: whoever is on an earlier one is an
-        old primary that lives on."""
+        """Remember that a server of this cluster has begun this timeline: a server on an earlier one is an old
+        primary that lives on."""
         self._newest[identifier] = max(timeline, self._newest.get(identifier, 0))
 
     def is_old(self, identifier: str, timeline: int) -> bool:
@@ -87,7 +87,8 @@ class Failover:
         return "a failover could lose what it confirms (synchronous_standby_names is empty)"
 
     async def said(self, primary: Primary) -> str | None:
-        """Return what Patroni says against this primary, "" for nothing, None if no Patroni answers."""
+        """Return why Patroni says that commits on this primary could be lost; "" if it does not say so, None
+        if no Patroni answers."""
         answers = await asyncio.gather(*(_asked(each) for each in self.patroni))
         ours = [each for each in answers if each is not None]
         if not ours:
@@ -112,7 +113,7 @@ class Watch:
         self._failover: Final = failover
         self._primary: Final = primary
         self._over = threading.Event()
-        #: What Patroni says against the primary; the connection is not to be used any more.
+        #: Why commits on the primary could be lost; "" while they cannot. The connection must not be used then.
         self.doubt = ""
         if failover.patroni:
             threading.Thread(target=self._run, name="failover watch", daemon=True).start()

@@ -61,8 +61,8 @@ def ends_of_slots(connection: Connection, position: Column[int]) -> list[int]:
 
 
 class Cursor(msgspec.Struct, frozen=True):
-    """A moment of a log: the number of the last event that was seen, for each slot from 0 on. As a text the
-    numbers stand side by side with dots between, without zeros at the end: `512` or `512.0.7`."""
+    """A moment of a log: the number of the last event that was seen, for each slot from 0 on. Its text is
+    these numbers with dots between, without zeros at the end: `512` or `512.0.7`."""
 
     numbers: tuple[int, ...] = ()
 
@@ -116,7 +116,7 @@ class Cursor(msgspec.Struct, frozen=True):
         return Cursor(_trimmed(numbers))
 
 
-def later(position: Column[int], cursor: Cursor) -> ColumnElement[bool]:
+def is_later(position: Column[int], cursor: Cursor) -> ColumnElement[bool]:
     """Return the condition that an event (by the column `position`) comes after a moment."""
     last = max(0, len(cursor.numbers) - 1)
     between = [
@@ -139,8 +139,8 @@ def cursor_of(connection: Connection, position: Column[int]) -> Cursor:
 def order_in_time(
     connection: Connection, position: Column[int], at: Column[int], seq: Column[int]
 ) -> tuple[Column[int], ...]:
-    """Return the columns by which events of several streams are sorted, the oldest first. Of a log of one
-    writer that is the position; else the clocks of its writers have to do, and `seq` within one moment."""
+    """Return the columns by which events of several streams are sorted, the oldest first: the position in
+    a log of one writer; else the time by the clocks of its writers, then `seq`."""
     newest = connection.execute(select(func.max(position))).scalar() or 0
     return (position,) if slot_of(newest) == 0 else (at, seq, position)
 
@@ -149,8 +149,8 @@ def is_between(position: Column[int], seen: Cursor, now: Cursor) -> ColumnElemen
     """Return the condition for events after the moment `seen` up to the moment `now`."""
     slots = range(len(now.numbers))
     ranges = [(seen.end_in(slot), now.end_in(slot)) for slot in slots]
-    later = [and_(position > low, position <= high) for low, high in ranges if low < high]
-    return or_(false(), *later)
+    parts = [and_(position > low, position <= high) for low, high in ranges if low < high]
+    return or_(false(), *parts)
 
 
 def _trimmed(numbers: list[int]) -> tuple[int, ...]:
@@ -161,10 +161,14 @@ def _trimmed(numbers: list[int]) -> tuple[int, ...]:
 
 class LogOrder:
     """Puts the stored events of several slots into one order that keeps the order of each slot and each
-    stream, with an event that removes a stream after what is left of that stream. Where that leaves a
-    choice, the older one comes first. If events are missing there is no such order, and all come
-    nevertheless. `removed`: returns which stream an event removes from the log, and its last seq; None for
-    other events. `seen`: the last seq of each stream before the first rows, 0 where it is missing. Rows have the columns of an event in its order, and may have more."""
+    stream. An event that removes a stream comes after the remaining events of that stream. Where that
+    leaves a choice, the older event comes first. If events are missing there is no such order; all are
+    returned nevertheless.
+
+    `removed`: returns which stream an event removes from the log, and its last seq; None for other
+    events. `seen`: the last seq of each stream before the first rows, 0 where it is missing. Rows have
+    the columns of an event in its order, and may have more.
+    """
 
     def __init__(
         self,

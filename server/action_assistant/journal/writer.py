@@ -91,8 +91,8 @@ class Transaction:
             self._epochs.clear()
 
     def hold(self, streams: Sequence[str]) -> None:
-        """Let no other process move these streams until the end of this transaction, so that it cannot be
-        overtaken by them again. Call it before the first job."""
+        """Begin on the server, and let no other process append to these streams until the end of this
+        transaction, so that it cannot be overtaken in them again. Call it before the first job."""
         self._session.begin()
         self._begun = True
         self._session.hold(streams)

@@ -18,7 +18,7 @@ from sqlalchemy import Row, func, select
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.errors import NotFound, Refused, TooLarge
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.slots import Cursor, later, slot_in
+from action_assistant.journal.slots import Cursor, is_later, slot_in
 from action_assistant.schema import editor_tables
 from action_assistant.schema.editor_tables import editor_event, editor_head
 from action_assistant.web.auth.caller import Caller, set_caller
@@ -168,7 +168,7 @@ class GraphNames:
             newest = select(
                 event.stream, func.max(event.seq).label("seq"), func.max(event.position).label("at")
             )
-            chosen = newest.where(later(event.position, seen))
+            chosen = newest.where(is_later(event.position, seen))
             rows = await self._journal.query(chosen.group_by(event.stream, slot_in(event.position)))
             for row in rows:
                 seen = seen.after(row.at)

@@ -22,7 +22,7 @@ from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import NotFound
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.slots import Cursor, later, slot_in
+from action_assistant.journal.slots import Cursor, is_later, slot_in
 from action_assistant.schema.editor_tables import (
     editor_event,
     editor_head,
@@ -272,7 +272,9 @@ class GraphPages:
         event = editor_event.c
         news = select(event.stream, func.max(event.position).label("at"))
         streams = await self._journal.query(
-            news.where(later(event.position, seen)).group_by(event.stream, slot_in(event.position))
+            news.where(is_later(event.position, seen)).group_by(
+                event.stream, slot_in(event.position)
+            )
         )
         ids = sorted({each for row in streams if (each := graph_of(row.stream)) is not None})
         found: list[ChangedGraph] = []
