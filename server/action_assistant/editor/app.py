@@ -158,11 +158,10 @@ async def _owners(
     if given is not None or settings.cluster is None:
         yield given or Alone()
         return
-    from action_assistant.editor.cluster.same_token import require_same_token  # slow to load
-    from action_assistant.editor.cluster.shared_owners import SharedOwners
+    from action_assistant.editor.cluster.shared_owners import SharedOwners  # slow to load
 
     async with SharedOwners.joined(journal, settings.database, settings.cluster.url) as owners:
-        await require_same_token(journal, Keys.of(settings.data).relay_key)
+        await owners.require_same_token(Keys.of(settings.data).relay_key)
         yield owners
 
 
@@ -300,7 +299,7 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
     )
     if settings.cluster is not None:
         made.entrance = _entrance(app_state, made, keys, settings.cluster.url)
-        made.leave = lambda: app_state.services.rooms.move_away()
+        made.drain = lambda: app_state.services.rooms.drain()
     return made
 
 

@@ -2,20 +2,18 @@
 
 import json
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from action_assistant.editor.app import create_app
-from action_assistant.editor.cluster.owners import Elsewhere, Here, Owner
+from action_assistant.editor.cluster.owners import Alone, Elsewhere, Here, Owner
 from action_assistant.editor.workers import prepare_workers
 from action_assistant.settings import Cluster, EditorSettings
 from action_assistant.web.server.listen import serve
 
 
-class FixedOwners:
-    """Owners by a file: the URL of the owner of each stream, and of all others under `*`."""
-
-    draining = False
+class FixedOwners(Alone):
+    """Owners by a file, which never move by themselves: the URL of the owner of each stream, and of all
+    others under `*`."""
 
     def __init__(self, file: Path, url: str) -> None:
         self._file = file
@@ -25,16 +23,7 @@ class FixedOwners:
         """Return the owner that the file names."""
         owners = json.loads(self._file.read_text())
         url = owners.get(stream, owners["*"])
-        return Here(0) if url == self._url else Elsewhere(url, 1)
-
-    async def give_up(self, stream: str) -> None:
-        """Do nothing: the file says who owns it."""
-
-    async def drain(self) -> None:
-        """Do nothing: the file says who owns what."""
-
-    def when_lost(self, hear: Callable[[str], object]) -> None:
-        """Do nothing: nothing is lost."""
+        return Here(0) if url == self._url else Elsewhere(url)
 
 
 def main(data: Path, database: str, port: int, inner: int, file: Path) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 import httpx
 import pytest
 
-from action_assistant.editor.cluster.owners import Elsewhere, Owner
+from action_assistant.editor.cluster.owners import Alone, Elsewhere, Owner
 from action_assistant.editor.cluster.peers import Peers
 from action_assistant.editor.cluster.relay_seal import RelayedFacts, RelaySeal
 from action_assistant.editor.rooms.remote_room import RemoteRoom
@@ -164,10 +164,8 @@ def test_the_public_port_knows_no_seals(pair: Pair, inside: Inside) -> None:
             assert made.json()["author"]["id"] == "local"
 
 
-class Here:
-    """Owners of an editor that owns nothing."""
-
-    draining = False
+class OwnsNothing(Alone):
+    """Owners of an editor that owns nothing; all streams are another editor's."""
 
     def __init__(self, url: str) -> None:
         self._url = url
@@ -175,21 +173,12 @@ class Here:
     async def owner(self, stream: str) -> Owner:
         """Return the other editor."""
         del stream
-        return Elsewhere(self._url, 1)
-
-    async def give_up(self, stream: str) -> None:
-        """Do nothing."""
-
-    async def drain(self) -> None:
-        """Do nothing."""
-
-    def when_lost(self, hear: Callable[[str], object]) -> None:
-        """Do nothing."""
+        return Elsewhere(self._url)
 
 
 async def test_a_remote_room_takes_edits_of_the_server_as_the_room_would(pair: Pair) -> None:
     graph = pair.new_graph()
-    peers = Peers(Here(pair.there.inner), SEAL)
+    peers = Peers(OwnsNothing(pair.there.inner), SEAL)
     room = RemoteRoom(f"graph/{graph}", peers)
     before, _ = await room.now()
     one, two = updates(("a", "1"), ("b", "2"))

@@ -20,15 +20,13 @@ async def test_the_only_editor_owns_every_stream_for_ever() -> None:
     assert await owners.owner("graph/a") == Here(None)
     await owners.give_up("graph/a")
     assert await owners.owner("graph/a") == Here(None)
-    assert not owners.draining
     assert lost == []
 
 
-class Two:
+class Two(Alone):
     """Owners as one of two editors sees them; the test moves streams between both."""
 
     def __init__(self) -> None:
-        self.draining = False
         self.elsewhere: set[str] = set()
         self.given_up: list[str] = []
         self.was_given_up = asyncio.Event()
@@ -36,19 +34,12 @@ class Two:
 
     async def owner(self, stream: str) -> Owner:
         """Return this editor, unless the test has moved the stream."""
-        return Elsewhere("http://other", 1) if stream in self.elsewhere else Here(3)
+        return Elsewhere("http://other") if stream in self.elsewhere else Here(3)
 
     async def give_up(self, stream: str) -> None:
         """Note that the stream was given up."""
         self.given_up.append(stream)
         self.was_given_up.set()
-
-    def check_again(self, stream: str) -> None:
-        """Do nothing: nothing is cached."""
-
-    async def drain(self) -> None:
-        """Take no streams any more."""
-        self.draining = True
 
     def when_lost(self, hear: Callable[[str], object]) -> None:
         """Keep whom to tell."""

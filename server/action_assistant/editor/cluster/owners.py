@@ -1,8 +1,7 @@
 """Owners of graphs, where several editors share one database.
 
-The owner of a stream has its room open and is the only one who appends to it. The log fences that by the epoch
-of the stream: an answer of `owner` may be old when it arrives, and the append or the other editor finds that
-out.
+Only the owner of a stream opens its room and appends to it. An answer of `owner` may be old when it arrives; then
+the log refuses the append, which names the epoch of the stream, or the other editor refuses what was relayed.
 """
 
 from collections.abc import Callable
@@ -12,19 +11,18 @@ import msgspec
 
 
 class Here(msgspec.Struct, frozen=True, gc=False):
-    """This editor owns the stream. `epoch`: how often the stream had changed hands then; appends to it
-    name this number, and are refused once another editor has taken the stream. None where streams have no
-    other owners."""
+    """This editor owns the stream. `epoch`: how often the stream was taken until then; appends to it name
+    this number, and are refused once another editor has taken the stream. None if this is the only
+    editor."""
 
     epoch: int | None
 
 
 class Elsewhere(msgspec.Struct, frozen=True, gc=False):
     """Another living editor owns the stream. `url`: where it takes what other editors relay, without a
-    slash at its end; `slot`: its number."""
+    slash at its end."""
 
     url: str
-    slot: int
 
 
 class Nobody(msgspec.Struct, frozen=True, gc=False):
@@ -53,23 +51,17 @@ class Owners(Protocol):
         """Forget what is known of the owner of a stream, since its room has ended: the next `owner` asks the
         database."""
 
-    @property
-    def draining(self) -> bool:
-        """Return whether this editor gives its rooms up and takes no others, because it ends."""
-
     async def drain(self) -> None:
         """Take no streams any more, and let other editors take those of this one, because it ends."""
 
     def when_lost(self, hear: Callable[[str], object]) -> None:
-        """Call `hear` from now on with each stream that this editor has owned and that another one has
-        taken, or that it may own no longer because the database does not hear it. Its room has to close
-        its sockets with 1012 at once. `hear` must not raise."""
+        """Call `hear` from now on with each stream that this editor has lost: another one has taken it, or
+        may do so, since the database does not hear this one. Its room has to close its sockets with 1012
+        at once. `hear` must not raise."""
 
 
 class Alone:
     """The owner of every stream: the only editor of its database."""
-
-    draining: Final = False
 
     async def owner(self, stream: str) -> Owner:
         """Return at once that this editor owns the stream, which never changes hands."""

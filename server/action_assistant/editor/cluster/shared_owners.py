@@ -1,11 +1,12 @@
 """Owners of graphs in a Postgres database that several editors share (decision 174).
 
-The table `room` says which editor owns a stream, `editor` which editors there are. Both are only signposts: who
-takes a stream raises its epoch, and appends to it name the epoch that they were made in. So a wrong suspicion that
-an editor is dead costs its clients a new connection and nothing else.
+The table `room` says which editor owns a stream, `editor` which editors there are. Neither protects the log:
+an editor that takes a stream raises its epoch, and each append names the epoch that it was made in. So a wrong
+suspicion that an editor is dead costs its clients a new connection and nothing else.
 """
 
 import asyncio
+import hmac
 import logging
 import secrets
 import threading
@@ -19,7 +20,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 
 from action_assistant.editor.cluster.chores import CHORES
 from action_assistant.editor.cluster.owners import Elsewhere, Here, Nobody, Owner
-from action_assistant.errors import Unavailable
+from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import START
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.journal import Journal
@@ -37,6 +38,10 @@ _ANSWER_S: Final = 1.0  # for a beat
 _PATIENCE_S: Final = 5.0  # for any other question
 _COMPARED_EACH: Final = 4  # beats between two comparisons of the streams owned
 _TIES: Final = 20  # how often another editor may be faster
+#: Without a beat, after which the token of an editor does not count. An editor that was frozen for more than
+#: `_DEAD_S` may go on, and would refuse what is relayed to it; one that died must not keep others from starting
+#: with a new token.
+_TOKEN_COUNTS_S: Final = 5.0
 _CONNECTIONS: Final = 2
 _NOW: Final = "(extract(epoch FROM clock_timestamp()) * 1000000)::bigint"
 _LIVES: Final = (
@@ -45,10 +50,10 @@ _LIVES: Final = (
 )
 #: The owner of a stream and whether it lives, as far as it is known.
 _LOOK: Final = text(
-    f"SELECT r.life, r.epoch, e.slot, e.url, coalesce({_LIVES}, false) AS lives"
+    f"SELECT r.life, r.epoch, e.url, coalesce({_LIVES}, false) AS lives"
     " FROM room r LEFT JOIN editor e ON e.life = r.life WHERE r.stream = :stream"
 )
-#: Nothing is returned for a stream without events: whoever asks for a graph that does not exist leaves nothing.
+#: Nothing is returned for a stream without events: a request for a graph that does not exist leaves no rows.
 _RAISE: Final = text("UPDATE head SET epoch = epoch + 1 WHERE stream = :stream RETURNING epoch")
 #: Nothing is returned if another editor was faster.
 _SHOW: Final = text(
@@ -81,14 +86,20 @@ _LEAVE: Final = (
     text("DELETE FROM room WHERE life = :life"),
     text("DELETE FROM editor WHERE life = :life"),
 )
+_SHOW_TOKEN: Final = text("UPDATE editor SET proof = :proof WHERE life = :life")
+_OTHER_TOKENS: Final = text(
+    f"SELECT url FROM editor WHERE proof <> :proof AND beat_at > {_NOW} - {int(_TOKEN_COUNTS_S * 1e6)}"
+    " ORDER BY slot"
+)
 _UNKNOWN: Final = "It cannot be found out which editor has this graph: {}."
 _DRAINING: Final = "This editor is ending; try again."
 _TIED: Final = "Other editors take this graph again and again; try again."
 
 
 class SharedOwners:
-    """Owners of streams, as one of several editors sees them and takes part. `journal`: opened for several
-    writers, on the Postgres database with the URL `database`; `url`: where other editors reach this one."""
+    """Finds the owners of streams, and takes streams, as one of several editors. `journal`: opened for
+    several writers, on the Postgres database with the URL `database`; `url`: where other editors reach
+    this one."""
 
     def __init__(self, journal: Journal, database: str, url: str) -> None:
         self._journal = journal
@@ -110,8 +121,8 @@ class SharedOwners:
     async def joined(
         cls, journal: Journal, database: str, url: str
     ) -> AsyncIterator["SharedOwners"]:
-        """Return a context in which this editor is one of several; at its end it owns nothing any more. The
-        parameters are those of the class. Raise Unavailable if the database cannot be written."""
+        """Return a context in which this editor is one of several; at its end it owns nothing any more.
+        The parameters are those of the class. Raise Unavailable if the database cannot be written."""
         owners = cls(journal, database, url)
         try:
             await owners._claim()
@@ -119,6 +130,30 @@ class SharedOwners:
             yield owners
         finally:
             await owners._leave()
+
+    async def require_same_token(self, key: bytes) -> None:
+        """Show to the other editors of this database which token this one has, without showing the token
+        itself, and compare. `key`: the key for what editors relay, which follows from the token. Raise
+        CannotStart if a living editor has another token, Unavailable if the database does not answer. Of
+        two that start at once with different tokens at least one is refused, since each shows its own
+        before it compares."""
+        proof = hmac.digest(key, b"an editor of this database", "sha256")
+        values = {"proof": proof, "life": self._life}
+
+        def show(connection: Connection) -> None:
+            connection.execute(_SHOW_TOKEN, values)
+
+        def compare(connection: Connection) -> list[str]:
+            return [row.url for row in connection.execute(_OTHER_TOKENS, values)]
+
+        await self._journal.derive(show)
+        others = await self._journal.derive(compare)
+        if others:
+            raise CannotStart(
+                f"The editor at {others[0]} has another token. All editors of one database need the same "
+                "token and the same data folder: start them with the same --data, or give them the same "
+                "ACTION_ASSISTANT_TOKEN."
+            )
 
     async def owner(self, stream: str) -> Owner:
         """Return the owner of a stream; take the stream if no living editor owns it. Raise Unavailable if
@@ -142,14 +177,9 @@ class SharedOwners:
             log.info("%s is taken from this editor later: %s", stream, cause_of(error))
 
     def check_again(self, stream: str) -> None:
-        """Forget that this editor owns a stream, because an append to it was refused: the next `owner` asks
-        the database."""
+        """Forget that this editor owns a stream, because an append to it was refused: the next `owner`
+        asks the database."""
         self._mine.pop(stream, None)
-
-    @property
-    def draining(self) -> bool:
-        """Return whether this editor gives its streams up and takes no others."""
-        return self._draining
 
     def when_lost(self, hear: Callable[[str], object]) -> None:
         """Call `hear` on the event loop with each stream that this editor owns no longer."""
@@ -181,13 +211,13 @@ class SharedOwners:
         raise Unavailable(_TIED)
 
     async def _look(self, connection: AsyncConnection, stream: str) -> Owner | None:
-        """Return the owner of a stream, which this editor takes if nobody living has it; None if another
-        one was faster."""
+        """Return the owner of a stream, which this editor takes if no living editor owns it. Return None
+        if another editor was faster."""
         row = (await connection.execute(_LOOK, {"stream": stream})).first()
         if row is not None and row.life == self._life:
             return Here(row.epoch)
         if row is not None and row.lives:
-            return Elsewhere(row.url, row.slot)
+            return Elsewhere(row.url)
         if self._draining:
             raise Unavailable(_DRAINING)
         epoch = (await connection.execute(_RAISE, {"stream": stream})).scalar()
@@ -216,8 +246,8 @@ class SharedOwners:
     # --- showing that this editor lives -----------------------------------------------------------
 
     async def _claim(self) -> None:
-        """Register this editor under the slot that its writer holds, on the writer's connection: so it does
-        hold it then."""
+        """Register this editor under the slot of its writer. The writer's own connection does that, so it
+        certainly holds the slot then."""
 
         def register(connection: Connection) -> None:
             values: dict[str, Any] = {"life": self._life, "slot": self._journal.slot}
@@ -252,15 +282,16 @@ class SharedOwners:
                 except _FAULTS as error:
                     log.info("a beat was not stored: %s", error)
                 beats += 1
-                while time.monotonic() < begun + _BEAT_S and not self._ended.is_set():  # noqa: ASYNC110 - set by another thread
+                # Another thread sets `_ended`.
+                while time.monotonic() < begun + _BEAT_S and not self._ended.is_set():  # noqa: ASYNC110
                     await asyncio.sleep(_LOOKED_S)
         finally:
             watching.cancel()
             await engine.dispose()
 
     def _was_heard(self, begun: float) -> None:
-        """Note that a beat which began then was stored, and lose all streams first if that took too long:
-        they may have been taken meanwhile."""
+        """Note that a beat was stored, which began at the time `begun`. If the beat before it was too long
+        ago, lose all streams first: others may have taken them."""
         if begun - self._beaten > _CUT_OFF_S + _BEAT_S:
             self._on_loop(self._lose_all)
         self._beaten = begun

@@ -25,7 +25,7 @@ LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
 _ANNOUNCEMENT_WINDOWS: Final = 10  # between two announcements of the sequence number
 _ELSEWHERE: Final = "Another editor has this graph open; try again."
-_PATIENCE_S: Final = 1.0  # with a room that is to be moved
+_PATIENCE_S: Final = 1.0  # with a room that another editor is to take
 _SILENCE: Final = 10.0  # seconds without a message after which a socket is sent a heartbeat
 
 
@@ -61,10 +61,9 @@ class Rooms:
         self._tasks: set[asyncio.Task[None]] = set()
         self._timers: dict[str, asyncio.TimerHandle] = {}
         self._deleted: set[str] = set()  # while this process owned them
-        self._taken: set[str] = (
-            set()
-        )  # streams that this editor owns, at least without an open room
-        self._closed = self._moving = False
+        #: Streams that this editor owns, at least those without an open room.
+        self._taken: set[str] = set()
+        self._closed = self._draining = False
         self._divergences = 0
         self.metrics: Final = RoomMetrics()
         self._heartbeat = asyncio.create_task(self._send_heartbeats(), name="heartbeat")
@@ -178,10 +177,10 @@ class Rooms:
         recovered."""
         return stream in self._deleted
 
-    async def move_away(self) -> None:
-        """Let other editors have the rooms, those with the fewest people first. Each is closed with 1012 when
-        all that was sent to it is stored."""
-        self._moving = True
+    async def drain(self) -> None:
+        """Let other editors take the rooms, those with the fewest people first. Each is closed with 1012
+        when all that was sent to it is stored."""
+        self._draining = True
         await self._owners.drain()
         for room in sorted(self.open_rooms(), key=lambda each: len(each.members)):
             try:
@@ -213,7 +212,7 @@ class Rooms:
         room = self._rooms.get(stream)
         if room is not None:
             return room
-        if self._closed or self._moving:
+        if self._closed or self._draining:
             raise Unavailable("The server is ending.")
         loading = self._loading.get(stream)
         if loading is None:
@@ -223,13 +222,11 @@ class Rooms:
     async def _load(self, stream: str) -> Room:
         outlive_connection()  # others may wait for it, even if the first caller has left
         try:
-            match await self._owners.owner(stream):
-                case Here(epoch):
-                    pass
-                case Elsewhere():
-                    raise Unavailable(_ELSEWHERE)
-                case Nobody():
-                    raise NotFound(f"There is no graph {graph_of(stream)!r}.")
+            owner = await self._owners.owner(stream)
+            if isinstance(owner, Elsewhere):
+                raise Unavailable(_ELSEWHERE)
+            if isinstance(owner, Nobody):
+                raise NotFound(f"There is no graph {graph_of(stream)!r}.")
             loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
             room = self._rooms[stream] = Room(
                 stream,
@@ -241,7 +238,7 @@ class Rooms:
                 self._run_in_worker,
                 self._tried,
                 self.metrics,
-                epoch,
+                owner.epoch,
             )
             self.metrics.opened += 1
             if stream not in self._holders:  # the socket had left before it was loaded

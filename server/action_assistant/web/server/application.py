@@ -217,11 +217,11 @@ def _methods(route: BaseRoute) -> Iterator[tuple[str, BaseRouteHandler]]:
 class Application:
     """The application of a process, with its OpenAPI document for programs that generate types from it.
     `access`: its access control; `entrance`: what answers other editors of the server at a listener of
-    its own, None without one; `leave`: called when the process is told to end, before its connections
-    are closed."""
+    its own, None without one; `drain`: called when the process is told to end, before its connections
+    are closed, to let other processes take over."""
 
     entrance: ASGIApp | None = None
-    leave: Callable[[], Awaitable[None]] | None = None
+    drain: Callable[[], Awaitable[None]] | None = None
 
     def __init__(self, outer: ASGIApp, openapi: OpenApiText, access: Access) -> None:
         self._outer = outer

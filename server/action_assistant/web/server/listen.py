@@ -42,7 +42,7 @@ _CALLS: Final = frozenset({"http", "websocket"})
 _WITHOUT_BODY: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Processor time and time (seconds) when what is answered came in.
 _RECEIVED: Final[ContextVar[tuple[float, float]]] = ContextVar("received", default=(0.0, 0.0))
-_LEAVE_S: Final = 8.0
+_DRAIN_S: Final = 8.0
 _FAILED: Final = 3  # exit code when the application could not be set up
 _BODY_S: Final = 30.0  # between two pieces of a body
 _ENDED_EARLY: Final = "The body ended early."
@@ -99,7 +99,7 @@ def serve(
     if application.entrance is not None:
         entrance = ActivityTracker(application.entrance, connections)
         server.listen_inside(inner, _configured(entrance, None, direct=direct))
-    server.leave = application.leave
+    server.drain = application.drain
     _end_with_parent(server)
     server.run(sockets=sockets)
     if not server.started:
@@ -380,7 +380,7 @@ class _Server(uvicorn.Server):
         self._ends: Final = asyncio.Event()
         self._inside: list[socket.socket] = []
         self._inner_config: uvicorn.Config | None = None
-        self.leave: Callable[[], Awaitable[None]] | None = None
+        self.drain: Callable[[], Awaitable[None]] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def listen_inside(self, sockets: list[socket.socket], config: uvicorn.Config) -> None:
@@ -446,10 +446,10 @@ class _Server(uvicorn.Server):
                 error.strerror,
             )
 
-    async def _left(self, leave: Callable[[], Awaitable[None]]) -> None:
+    async def _drain(self, drain: Callable[[], Awaitable[None]]) -> None:
         try:
-            async with asyncio.timeout(_LEAVE_S):
-                await leave()
+            async with asyncio.timeout(_DRAIN_S):
+                await drain()
         except Exception:  # it ends all the same
             log.exception("not everything was left in order")
 
@@ -462,12 +462,12 @@ class _Server(uvicorn.Server):
         )
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Shut down: let the application leave what others can take over, end streams, close the listeners, and wait for open requests. uvicorn calls
-        this once."""
+        """Shut down: let other processes take over, end streams, close the listeners, and wait for open
+        requests. uvicorn calls this once."""
         service_manager.notify("STOPPING=1")
         self._published.close()
-        if self.leave is not None:
-            await self._left(self.leave)
+        if self.drain is not None:
+            await self._drain(self.drain)
         self._endings.begin()
         self._connections.close()
         await super().shutdown(sockets)
