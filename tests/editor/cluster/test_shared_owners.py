@@ -119,7 +119,7 @@ async def test_a_stream_without_events_has_no_owner_and_leaves_nothing(
     event = Draft("thing.happened.v1", "ada", b"1")
     await one.journal.append("graph/made-up-1", [event])
     assert await two.epoch("graph/made-up-1") == 1
-    assert await one.owners.owner("graph/made-up-1") == Elsewhere("http://two", 1)
+    assert await one.owners.owner("graph/made-up-1") == Elsewhere("http://two")
 
 
 async def test_an_editor_that_has_ended_leaves_its_streams_to_the_others(postgres: Server) -> None:

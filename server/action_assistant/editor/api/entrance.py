@@ -21,7 +21,7 @@ from action_assistant.editor.cluster.relay_seal import (
     RelaySeal,
 )
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.remote_room import ROOMS, SEQ, SubmittedSeq
+from action_assistant.editor.rooms.remote_room import AUTHOR, EXPECTED, ROOMS, SEQ, SubmittedSeq
 from action_assistant.errors import NotFound, Refused, Unauthenticated, Unavailable
 from action_assistant.logs import begin
 from action_assistant.web.auth.access import origin_by
@@ -93,8 +93,7 @@ class Entrance:
                 return False
             if isinstance(owner, Elsewhere):
                 return False
-            path = scope["path"].removeprefix(PREFIX)
-            if path.startswith(ROOMS):
+            if facts.is_inner:
                 await self._room(stream, scope, send, facts, body)
             elif facts.identity is None:
                 raise Unauthenticated("Nobody is named for whom this is.")
@@ -102,7 +101,7 @@ class Entrance:
                 prefix = len(PREFIX)
                 inner: Any = {
                     **scope,
-                    "path": path,
+                    "path": scope["path"].removeprefix(PREFIX),
                     "raw_path": scope["raw_path"][prefix:],
                     "headers": [each for each in scope["headers"] if each[0] not in _SEALS],
                     "client": (facts.client, 0),
@@ -124,7 +123,7 @@ class Entrance:
             query = {
                 name: value for name, (value,) in parse_qs(scope["query_string"].decode()).items()
             }
-            author, expected = query["author"], query.get("expected")
+            author, expected = query[AUTHOR], query.get(EXPECTED)
             identity = facts.identity
             is_theirs = identity is not None and identity.person.id == author
             with acting_for(author, origin_by(identity) if identity and is_theirs else None):

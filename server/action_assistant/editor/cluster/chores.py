@@ -1,4 +1,4 @@
-"""Chores: work that one of all editors does, for the whole database."""
+"""Chores: work for the whole database, which only one of its editors does at a time."""
 
 import asyncio
 import logging
@@ -20,8 +20,8 @@ _LOOK_S: Final = 2.0
 async def done_by_one(
     owners: Owners, doing: Callable[[], AbstractAsyncContextManager[None]]
 ) -> AsyncIterator[None]:
-    """Return a context during which this editor does the chores for as long as it is the one that does
-    them. `doing`: returns a context in which they are done."""
+    """Return a context during which this editor does the chores while it is their owner. `doing`: returns
+    a context in which they are done."""
 
     async def take_turns() -> None:
         while True:
@@ -30,8 +30,8 @@ async def done_by_one(
                     async with doing():
                         while await _is_ours(owners):  # noqa: ASYNC110 - another process decides
                             await asyncio.sleep(_LOOK_S)
-                except Exception:  # they are begun again
-                    log.exception("what is done once is interrupted")
+                except Exception:  # whatever it is: they are begun again
+                    log.exception("the chores are interrupted")
             await asyncio.sleep(_LOOK_S)
 
     task = asyncio.create_task(take_turns(), name="chores")

@@ -1,4 +1,4 @@
-"""Takes up what other editors have changed of people and rules, of which every editor keeps a copy in memory."""
+"""Reads people and rules again after other editors changed them: each editor keeps a copy in memory."""
 
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -6,12 +6,12 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 import anyio
-from sqlalchemy import Connection, and_, or_, select
+from sqlalchemy import Connection, or_, select
 
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
-from action_assistant.journal.slots import Cursor, ends_of_slots, slot_of
+from action_assistant.journal.slots import Cursor, is_between
 from action_assistant.schema.editor_tables import editor_event
 
 log: Final = logging.getLogger(__name__)
@@ -25,8 +25,8 @@ _OF_RULES: Final = (h.RULED, h.FILED)
 
 
 class OthersChanges:
-    """Reads the events of all editors twice a second, and reads again what they have changed: `people` after
-    changes of persons and links, `rules` after those of folders and rules."""
+    """Polls the log twice a second for changes by other editors. Calls `people` after changes of persons
+    and links, `rules` after changes of folders and rules."""
 
     def __init__(self, journal: Journal, people: Refresh, rules: Refresh) -> None:
         self._journal = journal
@@ -37,8 +37,8 @@ class OthersChanges:
 
     @asynccontextmanager
     async def taken_up(self) -> AsyncIterator[None]:
-        """Return a context during which changes are taken up."""
-        self._seen, _ = await self._journal.ask(lambda connection: _news(connection, None))
+        """Return a context during which the log is polled."""
+        self._seen = await self._journal.cursor()
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._keep_up)
             yield
@@ -50,41 +50,34 @@ class OthersChanges:
                 await self.look()
             except Refused as error:  # where nothing can be read, nothing can be changed, either
                 log.warning("changes of other editors are not read: %s", error.detail)
-            except (
-                Exception
-            ):  # a fault of this program must not end it: copies would grow old for good
+            # A fault of this program must not end the loop: the copies would stay old for good.
+            except Exception:
                 log.exception("changes of other editors cannot be read")
             await anyio.sleep(_LOOK_S)
 
     async def look(self) -> None:
-        """Take up what was stored since the last call."""
-        before = self._seen
-        self._seen, changed = await self._journal.ask(lambda connection: _news(connection, before))
-        self._due |= changed
+        """Read again what was changed since the last call."""
+        before, now = self._seen, await self._journal.cursor()
+        if now != before:
+            self._due |= await self._journal.ask(
+                lambda connection: _changed(connection, before, now)
+            )
+            self._seen = now
         for kind, refresh in self._refreshes.items():
             if kind in self._due:
                 await refresh()
                 self._due.discard(kind)
 
 
-def _news(connection: Connection, seen: Cursor | None) -> tuple[Cursor, set[str]]:
-    """Return the present end of the log, and what was changed after the moment `seen` (None: nothing)."""
-    ends = ends_of_slots(connection, _event.position)
-    now = Cursor.at(ends)
-    if seen is None or now == seen:
-        return now, set()
-    later = [
-        and_(_event.position > seen.end_in(slot_of(end)), _event.position <= end)
-        for end in ends
-        if not seen.has(end)
-    ]
+def _changed(connection: Connection, seen: Cursor, now: Cursor) -> set[str]:
+    """Return what was changed between two moments: `people`, `rules`, both or none."""
     shared = or_(
         _event.stream.in_([h.PEOPLE, h.INVITATIONS, h.FOLDERS]), _event.kind.in_(_OF_RULES)
     )
-    chosen = select(_event.stream).where(or_(*later), shared).distinct()
+    chosen = select(_event.stream).where(is_between(_event.position, seen, now), shared).distinct()
     streams = {row.stream for row in connection.execute(chosen)}
     of_people = streams & {h.PEOPLE, h.INVITATIONS}
     changed = {"people"} if of_people else set()
     if streams - of_people:
         changed.add("rules")
-    return now, changed
+    return changed

@@ -1,4 +1,4 @@
-"""The way to other editors: requests and sockets are relayed to the owner of their stream (decision 175)."""
+"""The client for other editors: relays requests and sockets to the owner of their stream (decision 175)."""
 
 import asyncio
 import logging
@@ -42,7 +42,7 @@ _LOST: Final = "The editor that had this graph open has ended, and may have done
 
 
 class _Unreached(Exception):
-    """The owner certainly did nothing: another one may be asked."""
+    """The owner certainly did nothing, so the request may be sent again."""
 
 
 class _AnswerLost(Exception):
@@ -50,8 +50,8 @@ class _AnswerLost(Exception):
 
 
 class Call(NamedTuple):
-    """A request to relay. `target`: its path and query as they came in; `headers`: those that go along;
-    `is_inner`: it is one of the server itself to a room."""
+    """A request to relay. `target`: its path and query as they came in; `headers`: those that are relayed;
+    `is_inner`: the server itself asks a room."""
 
     method: str
     target: str
@@ -85,9 +85,9 @@ class Peers:
 
     @asynccontextmanager
     async def answer(self, stream: str, call: Call) -> AsyncIterator[httpx.Response | None]:
-        """Return a context with the answer of the owner of a stream to a request, whose body was not read
-        yet; None if no other editor owns it by now. Raise Unavailable if no owner answers, OutcomeUnknown
-        if it may have done what was asked."""
+        """Return a context with the answer of the owner of a stream, whose body was not read yet; None if
+        no other editor owns it by now. Raise Unavailable if no owner answers, OutcomeUnknown if the owner
+        may have done what was asked."""
         answer = await self._tried(
             stream, lambda owner: self._send(stream, owner, call), call.method
         )
@@ -98,8 +98,8 @@ class Peers:
                 await answer.aclose()
 
     async def socket(self, stream: str, call: Call) -> "OpenSocket | Refusal | None":
-        """Open a WebSocket at the owner of a stream. Return None if no other editor owns it by now, or
-        the owner's refusal. Raise Unavailable if no owner answers."""
+        """Open a WebSocket at the owner of a stream, and return it, or the owner's refusal; None if no
+        other editor owns it by now. Raise Unavailable if no owner answers."""
         return await self._tried(stream, lambda owner: self._connect(stream, owner, call), "GET")
 
     async def is_owner(self, stream: str, url: str) -> bool:
@@ -194,8 +194,8 @@ class Peers:
 
 
 def _require_taken(status: int, challenge: str) -> None:
-    """Raise _Unreached for the status of an answer that says that nothing was done: the other editor does not
-    own the stream, or does not take the seal."""
+    """Raise _Unreached if the status of an answer says that nothing was done: the other editor does not own
+    the stream, or does not accept the seal."""
     if status == MISDIRECTED:
         raise _Unreached("it does not own it")
     if status == 401 and challenge == SCHEME:

@@ -1,7 +1,7 @@
 """Sends requests and sockets of a graph to the editor that owns it (decision 175).
 
-It stands behind the access control: who asks is known, and goes along. What comes from another editor never
-passes here, so nothing is relayed twice.
+It stands behind the access control, so the identity of the client is known and is relayed too. Requests that
+another editor has relayed do not pass here, so nothing is relayed twice.
 """
 
 import asyncio
@@ -21,6 +21,7 @@ from action_assistant.editor.cluster.relayed_sockets import RelayedSocket, Relay
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.errors import OutcomeUnknown, Refused, TooLarge
 from action_assistant.web.http.refusals import refuse, refuse_socket
+from action_assistant.web.server.application import BODY_LIMIT
 
 log: Final = logging.getLogger(__name__)
 
@@ -38,13 +39,12 @@ _PASSED: Final = frozenset(
 _OWN: Final = frozenset(
     {b"connection", b"keep-alive", b"transfer-encoding", b"date", b"server", b"content-length"}
 )
-_MOST: Final = 10_000_000  # bytes of a body; no route of a graph takes more
 
 
 def stream_of(path: str) -> str | None:
-    """Return the stream to whose owner a request for this path belongs; None for paths that every editor
-    answers, as those with `.` or `..`: no route has one, and whoever sends them on resolves them to
-    another path."""
+    """Return the stream to whose owner a request for this path belongs; None for paths that every
+    editor answers itself. Those with `.` or `..` are such: no route has one, and a client that sends them
+    on resolves them to another path."""
     if not {".", ".."}.isdisjoint(path.split("/")):
         return None
     found = _OF_A_GRAPH.fullmatch(path)
@@ -52,8 +52,8 @@ def stream_of(path: str) -> str | None:
 
 
 class Relay:
-    """An ASGI middleware that passes on what is of graphs that this editor owns, and of none. `owned` says who
-    owns a stream."""
+    """An ASGI middleware that relays requests about graphs of other editors, and passes all others to
+    `app`. `owned` says who owns a stream."""
 
     def __init__(self, app: ASGIApp, owned: Owned, peers: Callable[[], Peers]) -> None:
         self._app = app
@@ -150,8 +150,8 @@ async def whole_body(receive: Receive) -> bytes:
         pieces.append(message.get("body", b""))
         size += len(pieces[-1])
         more = message.get("more_body", False)
-        if size > _MOST:
-            raise TooLarge(f"At most {_MOST // 1_000_000} MB are read.")
+        if size > BODY_LIMIT:
+            raise TooLarge(f"At most {BODY_LIMIT // 1_000_000} MB are read.")
     return b"".join(pieces)
 
 

@@ -1,9 +1,16 @@
 """The seal of what one editor relays to another (decision 175).
 
-A relayed request carries, in the header X-Relayed, who asks and from where, as the editor at which it came in has
-verified it. The header Authorization holds `Relay TIME.NONCE.MAC`: an HMAC under a key that follows from the
-server's token, over method, URL at the editor that is asked, digest of the body, these facts, time and nonce.
-Each counts once, within half a minute.
+A relayed request has three header fields:
+
+- `X-Relayed`: who asks and from where, as the editor at which the request came in has verified it. A JSON object
+  (`RelayedFacts`) in base64url.
+- `X-Relayed-Body`: the SHA-256 of the body, as 64 hexadecimal digits.
+- `Authorization: Relay TIME/NONCE/MAC`. TIME: when it was sealed, in seconds since 1970 with three decimals. NONCE:
+  16 random bytes, as 32 hexadecimal digits. MAC: an HMAC-SHA256, as 64 hexadecimal digits, under a key that
+  follows from the server's token, over these texts with a zero byte between: method, URL at the editor that is
+  asked, X-Relayed-Body, X-Relayed, TIME, NONCE.
+
+A seal counts once, and for 30 seconds before and after its TIME.
 """
 
 import base64
@@ -29,9 +36,10 @@ _REFUSED: Final = "This is no request of another editor of this server."
 
 
 class RelayedFacts(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The facts of a request that the editor at which it came in has verified. `identity`: who asks; None for work of the
-    server itself. `client`: the address of the client, as limits count it. `request`: the request id. `is_inner`: the
-    editor itself asks a room, and passes on no request of a client."""
+    """The facts of a request that the editor at which it came in has verified. `identity`: who asks;
+    None for work of the server itself. `client`: the address of the client, as limits count it.
+    `request`: the request id. `is_inner`: the editor itself asks a room, and passes on no request of a
+    client."""
 
     identity: Identity | None = None
     client: str = ""

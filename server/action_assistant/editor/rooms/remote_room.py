@@ -15,6 +15,9 @@ from action_assistant.errors import OutcomeUnknown, Refused, Unavailable, refuse
 #: The path of rooms at the listener for other editors.
 ROOMS: Final = "/rooms/"
 SEQ: Final = "x-seq"
+#: The parameters in the query of an edit: its author, and the number of the last change before it.
+AUTHOR: Final = "author"
+EXPECTED: Final = "expected"
 _MOVED: Final = "This graph has just moved to another editor; try again."
 _UNREADABLE: Final = "The editor that has this graph open gave an answer that cannot be read."
 
@@ -49,7 +52,7 @@ class RemoteRoom:
 
     async def submit(self, update: bytes, author: str, expected: int | None = None) -> int:
         """Do what `Room.submit` does. Raise OutcomeUnknown, too, if the answer was lost."""
-        query = {"author": author} | ({} if expected is None else {"expected": str(expected)})
+        query = {AUTHOR: author} | ({} if expected is None else {EXPECTED: str(expected)})
         call = Call("POST", f"{self._target}?{urlencode(query)}", body=update, is_inner=True)
         _, body = await self._ask(call)
         self.seq = msgspec.json.decode(body, type=SubmittedSeq).seq
