@@ -79,6 +79,17 @@ test("who is mentioned finds it, is notified, and comes to the comment", async (
   await ben.page.getByRole("switch", { name: "Notify me while I look elsewhere" }).check();
   await ben.page.keyboard.press("Escape");
 
+  // His page is open and not looked at, before anything happens that he could have seen.
+  await ben.page.evaluate(() => {
+    Object.defineProperty(document, "hidden", { get: () => true, configurable: true });
+    window.dispatchEvent(new Event("visibilitychange"));
+  });
+  await expect
+    .poll(() =>
+      ben.page.evaluate(async () => (await navigator.locks.query()).held?.map((l) => l.name)),
+    )
+    .not.toContain("aa.looked");
+
   // Ada picks him by keyboard; nothing else of the line is touched.
   const ada = await product.person(browser, "Ada");
   const graph = await product.chain(2);
@@ -94,10 +105,6 @@ test("who is mentioned finds it, is notified, and comes to the comment", async (
   await expect(field).toHaveValue("Is this long enough, @Ben ");
   await field.press("Control+Enter");
 
-  // His page is open and not looked at.
-  await ben.page.evaluate(() => {
-    Object.defineProperty(document, "hidden", { get: () => true, configurable: true });
-  });
   await expect(async () => {
     await ben.page.evaluate(() => window.dispatchEvent(new Event("visibilitychange")));
     expect(await ben.page.evaluate(() => window.shown.map(({ body }) => body))).toEqual([
