@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import httpx
 import pytest
 
 pytest.importorskip(
@@ -44,8 +45,12 @@ def _is_there(product: Product) -> bool:
     return False
 
 
+def _states(runner: httpx.Client) -> dict[str, str]:
+    return {each["name"]: each["state"] for each in runner.get("/api/robots").json()}
+
+
 @pytest.mark.timeout(240)
-def test_a_practice_robot_is_started_once_runs_a_graph_and_ends_with_the_runner(
+def test_a_practice_robot_is_started_once_ends_with_the_runner_and_is_started_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(os.environ, "PRACTICE_OF", str(tmp_path / "data"))
@@ -56,8 +61,7 @@ def test_a_practice_robot_is_started_once_runs_a_graph_and_ends_with_the_runner(
             assert (made.status_code, made.json()["name"]) == (201, "Practice")
             again = runner.post("/api/practice")
             assert (again.status_code, again.json()["type"]) == (409, "conflict")
-            states = lambda: {e["name"]: e["state"] for e in runner.get("/api/robots").json()}  # noqa: E731
-            _until("it answers", lambda: states().get("Practice") == "answering")
+            _until("it answers", lambda: _states(runner).get("Practice") == "answering")
         graph = product.cli("import", str(tmp_path / "one.json")).stdout.split()[0]
         ran = product.cli("run", graph, "--engine", "Practice")
         assert ran.returncode == 0, ran.stderr
@@ -68,3 +72,12 @@ def test_a_practice_robot_is_started_once_runs_a_graph_and_ends_with_the_runner(
         assert _is_there(product)
         product.kill()
         _until("its process has ended", lambda: not _is_there(product))
+        product.start()
+        with product.runner() as runner:
+            _until("its absence is seen", lambda: _states(runner).get("Practice") == "gone")
+            registered = runner.get("/api/robots/Practice").json()
+            again = runner.post("/api/practice")
+            assert (again.status_code, again.json()["domain"]) == (201, registered["domain"])
+            _until("it answers again", lambda: _states(runner).get("Practice") == "answering")
+            third = runner.post("/api/practice")
+            assert (third.status_code, third.json()["type"]) == (409, "conflict")

@@ -14,7 +14,7 @@ import {
   IconUserCheck,
 } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
-import { useState } from "react";
+import { type ReactNode, useState } from "react";
 import { errorText } from "../api/http";
 import { useLive, useRobotAnsweredAt } from "../api/page-link";
 import { useMay } from "../api/people";
@@ -46,6 +46,8 @@ interface Props {
   robot: Robot;
   onEdit: (robot: Registration) => void;
   onImport: (text: string, name: string) => void;
+  /** Brings a robot back that is gone. */
+  wayBack?: ReactNode;
 }
 
 type Sign = { good: boolean; text: string; age?: string };
@@ -236,7 +238,7 @@ function StopHere({ robot }: { robot: Robot }) {
   );
 }
 
-export function RobotCard({ robot, onEdit, onImport }: Props) {
+export function RobotCard({ robot, onEdit, onImport, wayBack }: Props) {
   const [open, setOpen] = useState<string | null>(null);
   const linked = robot.state !== "no_link";
   const count = (n: number | null, what: string) =>
@@ -256,6 +258,7 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
       <Drills robot={robot} />
       <WhyNot robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
+      {wayBack}
       <Signs robot={robot} />
       <RobotRuns robot={robot} onImport={onImport} />
       {linked && (

@@ -44,7 +44,7 @@ interface Props {
 /** The name of the robot that the runner starts for practice. */
 const PRACTICE = "Practice";
 
-function PracticeButton({ runner }: { runner: string }) {
+function PracticeButton({ runner, again = false }: { runner: string; again?: boolean }) {
   const client = useQueryClient();
   const start = useMutation({
     mutationFn: () => startPracticeRobot(runner),
@@ -59,8 +59,18 @@ function PracticeButton({ runner }: { runner: string }) {
       title="Starts an emulated robot on the server’s computer; it moves nothing"
       onClick={() => start.mutate()}
     >
-      Practice robot
+      {again ? "Start it again" : "Practice robot"}
     </Button>
+  );
+}
+
+/** Says why the practice robot is gone, and starts it again. */
+function PracticeEnded({ runner }: { runner: string }) {
+  return (
+    <div className="row-wrap gap-50">
+      <PracticeButton runner={runner} again />
+      <span className="quiet-xs">A practice robot ends with the server that started it.</span>
+    </div>
   );
 }
 
@@ -102,7 +112,7 @@ export function RobotsPage({ onImport }: Props) {
     setEditing({ robot: { ...NEW, name, domain, get_service }, isNew: true, at });
   };
   const isPractising = robots.some(({ name }) => name === PRACTICE);
-  const canPractise = may && reach?.no_reach === "" && !isPractising;
+  const mayPractise = may && reach?.no_reach === "";
   const button = (
     <Button
       variant="filled"
@@ -117,7 +127,7 @@ export function RobotsPage({ onImport }: Props) {
   const buttons = (
     <div className="row-wrap gap-50">
       {button}
-      {canPractise && runner !== undefined && <PracticeButton runner={runner} />}
+      {mayPractise && !isPractising && runner !== undefined && <PracticeButton runner={runner} />}
     </div>
   );
   return (
@@ -160,6 +170,12 @@ export function RobotsPage({ onImport }: Props) {
                   robot={robot}
                   onEdit={(robot) => setEditing({ robot, isNew: false })}
                   onImport={onImport}
+                  wayBack={
+                    mayPractise &&
+                    runner !== undefined &&
+                    robot.name === PRACTICE &&
+                    robot.state === "gone" && <PracticeEnded runner={runner} />
+                  }
                 />
               ))}
           </Fragment>

@@ -34,12 +34,15 @@ class PracticeRobot:
         self.turn = Lock()
         self._process: subprocess.Popen[bytes] | None = None
 
-    async def start(self, taken: Collection[int]) -> Registration:
-        """Start the robot on a domain that is not `taken`, and return its registration."""
+    @property
+    def is_running(self) -> bool:
+        """True while the process of the robot goes on."""
+        return self._process is not None and self._process.poll() is None
+
+    async def start(self, domain: int) -> None:
+        """Start the robot on a domain."""
         self.end()
-        domain = next(each for each in _DOMAINS if each not in taken)
         self._process = await to_thread.run_sync(_spawned, domain)
-        return Registration(name=NAME, domain=domain, led=True)
 
     def end(self) -> None:
         """Have the process end, if there is one."""
@@ -47,6 +50,11 @@ class PracticeRobot:
             self._process.stdin.close()
             self._process.poll()
         self._process = None
+
+
+def _registration(taken: Collection[int]) -> Registration:
+    """Return a registration of the robot on a domain that is not `taken`."""
+    return Registration(name=NAME, domain=next(d for d in _DOMAINS if d not in taken), led=True)
 
 
 def _spawned(domain: int) -> subprocess.Popen[bytes]:
@@ -67,7 +75,8 @@ def practice_route(services: RunnerServices, practice: PracticeRobot) -> HTTPRou
         "/api/practice",
         summary="Start an emulated robot on the computer of the runner, and register it",
         description=f"Its name is `{NAME}`. It moves nothing, is seen on this computer only, and ends with the "
-        "runner, or when it is forgotten. 503 where the runner has no ROS 2.",
+        "runner, or when it is forgotten. Where it is registered and nobody answers there, it is started again. "
+        "503 where the runner has no ROS 2.",
         operation_id="startPracticeRobot",
         guards=[Needs("register")],
     )
@@ -77,9 +86,13 @@ def practice_route(services: RunnerServices, practice: PracticeRobot) -> HTTPRou
             if robots.no_reach:
                 raise Unavailable(robots.no_reach)
             if NAME in robots.names:
-                raise Conflict(f"There is a robot {NAME} already; forget it first.")
-            taken = {robots.registration(name).domain for name in robots.names}
-            asked = await practice.start({*taken, int(os.environ.get("ROS_DOMAIN_ID", "0"))})
+                if practice.is_running or robots.robot(NAME).servers > 0:
+                    raise Conflict(f"There is a robot {NAME} already; forget it first.")
+                asked = robots.registration(NAME)
+            else:
+                taken = {robots.registration(name).domain for name in robots.names}
+                asked = _registration({*taken, int(os.environ.get("ROS_DOMAIN_ID", "0"))})
+            await practice.start(asked.domain)
             try:
                 await services.control.register(asked, author_of(request))
             except BaseException:
