@@ -106,6 +106,7 @@ class Editor:
         self._n = n
         self._lives = 0
         self.out = folder / f"acknowledged-{n}"
+        self.out.touch()  # on a busy machine one may end before it joins
         self.begin()
 
     def begin(self) -> None:
