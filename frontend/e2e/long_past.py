@@ -26,7 +26,9 @@ async def _written(data: Path) -> None:
         for changes, actions in past.SIZES:
             updates, _ = past.long_past(random.Random(1), changes, actions)
             name = f"past{changes}"
-            await journal.append(about_stream(name), [draft(CREATED, "ada", GraphCreated(name, ""))])
+            await journal.append(
+                about_stream(name), [draft(CREATED, "ada", GraphCreated(name, ""))]
+            )
             await past.store(journal, updates, name)
     finally:
         await journal.close()
