@@ -28,6 +28,7 @@ from action_assistant.settings import (
     more_hosts,
 )
 from action_assistant.share_links import invitations_as_text, is_alive, is_ours
+from action_assistant.system.parent import PARENT
 from action_assistant.system.posix import cause_of_end
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
@@ -127,7 +128,7 @@ class Child:
         """Start the process. `parent` is the reading end of a pipe that closes when this process
         dies."""
         environment = {**self._interpreter.environment(os.environ), **self._settings}
-        environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
+        environment[PARENT] = str(parent)
         for name in ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"):
             environment.pop(name, None)  # the service manager hears this process alone
         self._born = time.monotonic()

@@ -1,19 +1,18 @@
 """A robot to practise with, by one press: over rclpy, with the real product."""
 
 import json
-import os
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import httpx
+import psutil
 import pytest
 
 pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from support.product import Product, running
+from support.product import Product, is_alive, running
+from support.waiting import until
 
 GRAPH = {
     "graph_name": "one",
@@ -23,26 +22,11 @@ GRAPH = {
 }
 
 
-def _until(what: str, is_so: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 30
-    while not is_so():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.1)
-
-
-def _is_there(product: Product) -> bool:
-    """Return whether the process of the robot goes on; its parent is the runner of `product`."""
-    for each in Path("/proc").glob("[0-9]*"):
-        try:
-            words = (each / "cmdline").read_bytes().split(b"\0")
-            if (
-                b"simulate-robot" in words
-                and str(product.data).encode() in (each / "environ").read_bytes()
-            ):
-                return True
-        except OSError:
-            continue
-    return False
+def _process_of_robot(product: Product) -> psutil.Process:
+    (found,) = [
+        each for each in product.process("runner").children() if "simulate-robot" in each.cmdline()
+    ]
+    return found
 
 
 def _states(runner: httpx.Client) -> dict[str, str]:
@@ -51,9 +35,8 @@ def _states(runner: httpx.Client) -> dict[str, str]:
 
 @pytest.mark.timeout(240)
 def test_a_practice_robot_is_started_once_ends_with_the_runner_and_is_started_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
 ) -> None:
-    monkeypatch.setitem(os.environ, "PRACTICE_OF", str(tmp_path / "data"))
     (tmp_path / "one.json").write_text(json.dumps(GRAPH))
     with running(tmp_path / "data") as product:
         with product.runner() as runner:
@@ -61,7 +44,9 @@ def test_a_practice_robot_is_started_once_ends_with_the_runner_and_is_started_ag
             assert (made.status_code, made.json()["name"]) == (201, "Practice")
             again = runner.post("/api/practice")
             assert (again.status_code, again.json()["type"]) == (409, "conflict")
-            _until("it answers", lambda: _states(runner).get("Practice") == "answering")
+            until(
+                "the robot did not answer", lambda: _states(runner).get("Practice") == "answering"
+            )
         graph = product.cli("import", str(tmp_path / "one.json")).stdout.split()[0]
         ran = product.cli("run", graph, "--engine", "Practice")
         assert ran.returncode == 0, ran.stderr
@@ -69,15 +54,18 @@ def test_a_practice_robot_is_started_once_ends_with_the_runner_and_is_started_ag
         log = product.cli("runs", "log", run["id"], "--level", "info")
         assert "info           Received request to start UMRF graph: one" in log.stdout
         assert product.cli("runs", "log", run["id"], "--level", "error").stdout == ""
-        assert _is_there(product)
+        robot = _process_of_robot(product)
         product.kill()
-        _until("its process has ended", lambda: not _is_there(product))
+        until("the process of the robot did not end", lambda: not is_alive(robot))
         product.start()
         with product.runner() as runner:
-            _until("its absence is seen", lambda: _states(runner).get("Practice") == "gone")
+            until("its absence was not seen", lambda: _states(runner).get("Practice") == "gone")
             registered = runner.get("/api/robots/Practice").json()
             again = runner.post("/api/practice")
             assert (again.status_code, again.json()["domain"]) == (201, registered["domain"])
-            _until("it answers again", lambda: _states(runner).get("Practice") == "answering")
+            until(
+                "the robot did not answer again",
+                lambda: _states(runner).get("Practice") == "answering",
+            )
             third = runner.post("/api/practice")
             assert (third.status_code, third.json()["type"]) == (409, "conflict")

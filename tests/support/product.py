@@ -124,7 +124,7 @@ class Product:
         os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         deadline = time.monotonic() + 20
-        while any(map(_is_alive, children)) and time.monotonic() < deadline:
+        while any(map(is_alive, children)) and time.monotonic() < deadline:
             time.sleep(0.01)
         self._process = None
 
@@ -188,7 +188,7 @@ def _client(url: str) -> httpx.Client:
     )
 
 
-def _is_alive(process: psutil.Process) -> bool:
+def is_alive(process: psutil.Process) -> bool:
     """Return whether a process still holds anything; a zombie holds nothing."""
     try:
         return process.status() != psutil.STATUS_ZOMBIE

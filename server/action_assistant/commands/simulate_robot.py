@@ -5,8 +5,7 @@ import json
 import os
 import signal
 import sys
-import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,6 +24,7 @@ from action_assistant.runner.emulator.messages import (
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.safe_text import one_line
+from action_assistant.system.parent import when_parent_ends
 from action_assistant.umrf.facts import facts_of
 from action_assistant.umrf.semantics import Script, script_from
 
@@ -59,11 +59,6 @@ def _add_simulate_robot(robot: argparse.ArgumentParser) -> None:
         help=f"what it shall do like a real one; there are: {_known()}",
     )
     robot.add_argument("--facts", metavar="COMMIT", help="of the engine that it stands in for")
-    robot.add_argument(
-        "--until-eof",
-        action="store_true",
-        help="end with the standard input, as when the program ends that started it",
-    )
     robot.add_argument("--wake-words", default="", metavar="A,B", help="others that it answers to")
     robot.set_defaults(handler=_simulate_robot)
 
@@ -159,17 +154,11 @@ def _simulate_robot(options: argparse.Namespace) -> int:
         raise CannotStart(f"Domain {domain} cannot be joined: {error}.") from error
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: node.end())
-    if options.until_eof:
-        threading.Thread(target=_end_at_eof, args=[node.end], daemon=True).start()
+    when_parent_ends(node.end)
     print(
         f"{node.robot.actor} is on domain {domain} and moves nothing. Ctrl-C ends it.", flush=True
     )
     return 1 if node.spin() else 0
-
-
-def _end_at_eof(end: Callable[[], None]) -> None:
-    sys.stdin.buffer.read()
-    end()
 
 
 def _tell(said: Said) -> None:

@@ -38,6 +38,7 @@ from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
 from action_assistant.private_files import make_folder, opener
 from action_assistant.system import posix
+from action_assistant.system.parent import pipe_of_parent
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 _LOCK: Final = ".action-assistant.lock"
@@ -204,7 +205,7 @@ def keep_making(plan: RegularBackups, every: float) -> int:
     process; return the exit code. The process gets a low priority."""
     os.nice(_NICE)
     signal.signal(signal.SIGTERM, _end)
-    parent = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
+    parent = pipe_of_parent()
     due = _first(plan, every)
     try:
         while True:
@@ -325,11 +326,11 @@ def _first(plan: RegularBackups, every: float) -> float:
     return max(time.time(), min(last.at, time.time()) + every)
 
 
-def _wait_until(due: float, parent: str | None) -> bool:
+def _wait_until(due: float, parent: int | None) -> bool:
     """Wait until `due` (seconds since 1970). Return False if the parent process, which holds the
     other end of the pipe `parent`, ends first. It waits in slices, since clocks may be changed."""
     while (left := due - time.time()) > 0:
-        ends = [] if parent is None else [int(parent)]
+        ends = [] if parent is None else [parent]
         if select.select(ends, [], [], min(left, 60.0))[0]:
             return False
     return True

@@ -13,13 +13,14 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
-from action_assistant.runner.api.practice import NAME as PRACTICE
-from action_assistant.runner.api.practice import PracticeRobot, practice_route
+from action_assistant.runner.api.practice import practice_route
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.run_guard import require_all_on_robot, shown, unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.links.behaviours.folder import BehaviourList
 from action_assistant.runner.links.port import Candidate, Registration, Sighting
+from action_assistant.runner.robots.practice_robot import NAME as PRACTICE
+from action_assistant.runner.robots.practice_robot import PracticeRobot
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.rights import (

@@ -3,7 +3,6 @@
 import asyncio
 import gc
 import logging
-import os
 import socket
 import sys
 import threading
@@ -23,6 +22,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
 from action_assistant.system import posix, service_manager
+from action_assistant.system.parent import when_parent_ends
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.connections import Connections, has_unread
 from action_assistant.web.server.application import Application
@@ -100,7 +100,7 @@ def serve(
         entrance = ActivityTracker(application.entrance, connections)
         server.listen_inside(inner, _configured(entrance, None, direct=direct))
     server.drain = application.drain
-    _end_with_parent(server)
+    when_parent_ends(server.end)
     server.run(sockets=sockets)
     if not server.started:
         raise CannotStart("The process could not be set up; the log above says why.")
@@ -487,18 +487,3 @@ def _shorten_error(record: logging.LogRecord) -> bool:
         record.exc_info = None
         record.levelno, record.levelname = logging.WARNING, "WARNING"
     return True
-
-
-def _end_with_parent(server: _Server) -> None:
-    """Let `server` shut down when the process that started it dies, for any reason: its end of a
-    pipe closes then. A daemon thread watches that."""
-    descriptor = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
-    if descriptor is None:
-        return
-
-    def wait() -> None:
-        with os.fdopen(int(descriptor), "rb") as pipe:
-            pipe.read()
-        server.end()
-
-    threading.Thread(target=wait, name="parent", daemon=True).start()
