@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import pytest
 from sqlalchemy import Executable
 from sqlalchemy.dialects.postgresql import insert
@@ -22,6 +23,7 @@ from action_assistant.journal.slots import Cursor, before_first, slot_of
 from action_assistant.schema import editor_tables
 from action_assistant.web.audit.rows import AuditFilter, Fact, audit_page
 from journal.servers import Server
+from journal.whole_log import whole_log
 
 #: Events that each random writer appends.
 EVENTS = int(os.environ.get("SOAK_OVERTAKEN", "20"))
@@ -37,14 +39,6 @@ def draft(text: str = "x") -> Draft:
 
 async def opened(url: str, fold: Fold = nothing, *, several: bool = True) -> Journal:
     return await Journal.open(url, branch="editor", fold=fold, several=several)
-
-
-async def everything(journal: Journal) -> list[Event]:
-    """Return all events in order of their positions."""
-    stored: list[Event] = []
-    while page := await journal.read_all(after=stored[-1].position if stored else 0):
-        stored += page
-    return stored
 
 
 async def test_each_writer_has_a_slot_and_the_only_writer_has_none_beside_it(
@@ -216,7 +210,7 @@ async def test_writers_of_shared_streams_whose_connections_are_cut_lose_nothing(
         await asyncio.sleep(dice.uniform(0.02, 0.2))
         await asyncio.to_thread(postgres.sql, _CUT, url.rpartition("/")[2])
     await asyncio.gather(*races)
-    stored = await everything(journals[0])
+    stored = await whole_log(journals[0])
     refused = sum((each.refused for each in racers), Counter())
     assert refused["not known"] == 0
     told = [each for racer in racers for each in racer.acknowledged]
@@ -275,9 +269,8 @@ async def test_whoever_follows_hears_the_events_of_all_writers_in_the_order_of_t
         for event in page:
             read.append((event.stream, event.seq))
             seen = Cursor.parse(str(seen.after(event.position)))
-    assert sorted(read) == sorted(heard)
+    assert sorted(read) == sorted(heard) == sorted(set(heard))
     for stream in {stream for stream, _ in read}:
-        assert sorted(read) == sorted(set(read))
         seqs = [seq for each, seq in read if each == stream]
         assert seqs == sorted(seqs)
     assert seen == await journals[0].cursor()
@@ -290,25 +283,31 @@ async def test_the_audit_of_several_writers_is_paged_by_time(postgres: Server) -
     url = postgres.new_database()
     journals = [await opened(url) for _ in range(3)]
     for n in range(25):
-        await journals[n % 3].append(f"s{n % 2}", [draft(str(n))])
+        by = "bob" if n % 4 == 0 else "ada"
+        kind = "noise.v1" if n == 12 else "thing.happened.v1"
+        await journals[n % 3].append(f"s{n % 2}", [Draft(kind, by, str(n).encode())])
 
     def describe(event: Event) -> Fact:
         return Fact(kind="other", text=event.body.decode())
 
-    told: list[int] = []
-    before: int | None = None
-    while True:
-        wanted = AuditFilter(before=before, limit=4)
-        page = await journals[0].ask(
-            lambda connection, wanted=wanted: audit_page(
-                connection, "editor", wanted, describe, frozenset()
+    async def told(wanted: AuditFilter, *never: str) -> list[int]:
+        found: list[int] = []
+        while True:
+            page = await journals[0].ask(
+                lambda connection, wanted=wanted: audit_page(
+                    connection, "editor", wanted, describe, frozenset(never)
+                )
             )
-        )
-        told += [int(row.text) for row in page.rows]
-        if page.before is None:
-            break
-        before = page.before
-    assert told == list(range(25))[::-1]
+            found += [int(row.text) for row in page.rows]
+            if page.before is None:
+                return found
+            wanted = msgspec.structs.replace(wanted, before=page.before)
+
+    assert await told(AuditFilter(limit=4)) == list(range(25))[::-1]
+    assert await told(AuditFilter(limit=2, person="bob"), "noise.v1") == [24, 20, 16, 8, 4, 0]
+    at = {int(each.body): each.at for each in await whole_log(journals[0])}
+    within = AuditFilter(limit=2, since=at[5], until=at[20])
+    assert await told(within) == [n for n in range(24, -1, -1) if at[5] <= at[n] < at[20]]
     for each in journals:
         await each.close()
 

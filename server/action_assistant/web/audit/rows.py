@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, get_args
 
 import msgspec
-from sqlalchemy import Connection, Select, func, select
+from sqlalchemy import ColumnElement, Connection, Select, and_, func, select
 
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
@@ -190,36 +190,36 @@ def _page_by_time(
     """Return a page of a log of several writers, by the times of its events; the cursor is a time, too. All
     rows of one time are on one page."""
     until = wanted.before if wanted.before is not None else 1 << 62
+    is_wanted = _is_wanted(wanted, never)
     merged = heapq.merge(
         *(
-            _slot_by_time(connection, end, until)
+            _slot_by_time(connection, end, until, is_wanted)
             for end in ends_of_slots(connection, _event.position)
         ),
-        key=lambda event: -event.at,
+        key=lambda found: -found[0].at,
     )
     rows: list[AuditRow] = []
     back_to: int | None = None
-    for looked, event in enumerate(merged):
+    for looked, (event, may_count) in enumerate(merged):
         if event.at != back_to and (len(rows) >= wanted.limit or looked >= _MOST):
             return AuditPage(tuple(rows), back_to, _when(back_to))
         back_to = event.at
         if wanted.since is not None and event.at < wanted.since - _DAY_US:
             break
-        is_wanted = (
-            event.kind not in never
-            and event.seq > gone.get(event.stream, 0)
-            and (not wanted.person or event.author == wanted.person)
-            and (wanted.since is None or event.at >= wanted.since)
-            and (wanted.until is None or event.at < wanted.until)
-        )
-        if is_wanted and (row := _row(branch, event, wanted, describe)) is not None:
+        if not may_count or event.seq <= gone.get(event.stream, 0):
+            continue
+        row = _row(branch, event, wanted, describe)
+        if row is not None:
             rows.append(row)
     return AuditPage(tuple(rows), None, _when(back_to))
 
 
-def _slot_by_time(connection: Connection, end: int, until: int) -> Iterator[Event]:
-    """Yield the events of a slot, whose last position is `end`, of before the time `until`, newest first. The
-    clock of its writer may have gone back by a day."""
+def _slot_by_time(
+    connection: Connection, end: int, until: int, is_wanted: ColumnElement[bool]
+) -> Iterator[tuple[Event, bool]]:
+    """Yield the events of a slot from before the time `until`, the newest first, each with the value of
+    `is_wanted`. `end`: the last position of the slot. The clock of its writer may have gone back by a
+    day."""
     begin = before_first(slot_of(end))
     low, high = begin, end
     while low < high:  # the last event that is not surely later
@@ -230,11 +230,12 @@ def _slot_by_time(connection: Connection, end: int, until: int) -> Iterator[Even
             high = middle - 1
         else:
             low = middle
-    chosen = _EVENTS.where(_event.position > begin).order_by(_event.position.desc())
+    chosen = _EVENTS.add_columns(is_wanted).where(_event.position > begin)
+    chosen = chosen.order_by(_event.position.desc())
     while page := connection.execute(chosen.where(_event.position <= high).limit(_SLICE)).all():
         for row in page:
             if row.at < until:
-                yield Event(*row)
+                yield Event(*row[:-1]), bool(row[-1])
         high = page[-1].position - 1
 
 
@@ -242,16 +243,22 @@ def _events(
     connection: Connection, wanted: AuditFilter, never: Collection[str], low: int, high: int
 ) -> Iterator[Event]:
     chosen: Select[Any] = _EVENTS.where(
-        _event.position >= low, _event.position < high, _event.kind.not_in(never)
+        _event.position >= low, _event.position < high, _is_wanted(wanted, never)
     )
-    if wanted.person:
-        chosen = chosen.where(_event.author == wanted.person)
-    if wanted.since is not None:
-        chosen = chosen.where(_event.at >= wanted.since)
-    if wanted.until is not None:
-        chosen = chosen.where(_event.at < wanted.until)
     for row in connection.execute(chosen.order_by(_event.position.desc())):
         yield Event(*row)
+
+
+def _is_wanted(wanted: AuditFilter, never: Collection[str]) -> ColumnElement[bool]:
+    """Return the condition for events that may be rows, by what the log knows of them."""
+    parts: list[ColumnElement[bool]] = [_event.kind.not_in(never)]
+    if wanted.person:
+        parts.append(_event.author == wanted.person)
+    if wanted.since is not None:
+        parts.append(_event.at >= wanted.since)
+    if wanted.until is not None:
+        parts.append(_event.at < wanted.until)
+    return and_(*parts)
 
 
 def drops(connection: Connection) -> list[tuple[int, AuditDropped]]:
