@@ -44,6 +44,7 @@ from action_assistant.web.auth.access import (
 from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.keys import Keys, Session
+from action_assistant.web.auth.people_files import NAME_LIMIT
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import (
     Sessions,
@@ -62,7 +63,6 @@ _KEPT: Final = 4  # sign-ins that one browser may have under way, besides the ne
 _ASKED_S: Final = 5.0  # by which the provider may have asked before it was told to ask
 _SKEW_S: Final = 120.0
 _BODY: Final = 20_000  # bytes; strangers send it
-_NAME: Final = 60  # characters
 _Short = Annotated[str, msgspec.Meta(max_length=200)]
 _Long = Annotated[str, msgspec.Meta(max_length=4000)]
 _Asking = Request[Any, Any, Any]
@@ -264,7 +264,7 @@ class ProviderSignIn:
         members.refuse_ended(person)
         role, address = settings.role(found.groups), client_address(request.scope)
         if role is None:
-            with acting_for(person, Origin(found.name[:_NAME], address=address)):
+            with acting_for(person, Origin(found.name[:NAME_LIMIT], address=address)):
                 await self._put_out(person, found)
             raise Forbidden(
                 f"{settings.name} knows you, but none of your groups there may come in here. Ask "
@@ -274,7 +274,7 @@ class ProviderSignIn:
         now = session_of(request)
         goes_on = now is not None and now.personal and now.person.id == person
         id_ = now.id if now is not None and goes_on else random_id()
-        with acting_for(person, Origin(found.name[:_NAME], id_, address=address)):
+        with acting_for(person, Origin(found.name[:NAME_LIMIT], id_, address=address)):
             came = await provided(members, found.issuer, found.subject, found.name, role, mapped)
         session = await self._sessions.begin(came, id_, request)
         self._sessions.note_sign_in(session, "oidc", request)

@@ -45,14 +45,13 @@ from action_assistant.schema import editor_tables
 from action_assistant.web.auth import people_files
 from action_assistant.web.auth.caller import Origin, acting_for, origin_in
 from action_assistant.web.auth.keys import Keys, PersonRef
-from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
+from action_assistant.web.auth.people_files import NAME_LIMIT, PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role, rank
 from action_assistant.web.auth.sessions import Invited
 
 log: Final = logging.getLogger(__name__)
 
-NAME_LIMIT: Final = 60  # characters
 LINK_HOURS: Final = 72.0
 
 _USED: Final = (

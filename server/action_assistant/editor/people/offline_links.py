@@ -12,13 +12,12 @@ from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth import people_files
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
+from action_assistant.web.auth.people_files import NAME_LIMIT, PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
 
 LINKS: Final = "links"
 MOST_HOURS: Final = 30 * 24.0
-_NAME: Final = 60  # characters
 _LATEST: Final = 250_000_000_000.0  # seconds since 1970: before the year 10000
 
 
@@ -55,7 +54,7 @@ def known_offline(data: Path, text: str) -> list[PersonFile]:
 def make_offline(data: Path, keys: Keys, name: str, role: Role | None, hours: float) -> str:
     """Make a personal link in a data folder without a server, and return its path. The person is
     the one of this name who is there, or a new one. Raise OSError if it cannot be written."""
-    name = " ".join(name.split())[:_NAME] or "Owner"
+    name = " ".join(name.split())[:NAME_LIMIT] or "Owner"
     same = known_offline(data, name)
     person = same[0] if same else PersonFile(random_id(), name, "operator")
     person = person if role is None else replace(person, role=role)

@@ -9,11 +9,11 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.editor.log import people_events as e
-from action_assistant.editor.people.members import NAME_LIMIT, Member, Members
+from action_assistant.editor.people.members import Member, Members
 from action_assistant.kit.moments import moment
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.keys import PersonRef
-from action_assistant.web.auth.people_files import PersonFile
+from action_assistant.web.auth.people_files import NAME_LIMIT, PersonFile
 from action_assistant.web.auth.roles import Role, rank
 
 _NUMBER: Final = 7  # characters that a number after a name takes at most

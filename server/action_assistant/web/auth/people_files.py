@@ -29,6 +29,8 @@ from action_assistant.private_files import (
 from action_assistant.web.auth.roles import Role
 
 FOLDER: Final = "people"
+#: Characters of a person's name, at most.
+NAME_LIMIT: Final = 60
 _GROUPS: Final = "groups"
 _ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 

@@ -34,7 +34,7 @@ from action_assistant.web.auth.caller import Origin, acting_for, client_network
 from action_assistant.web.auth.confirmations import is_sure
 from action_assistant.web.auth.device_codes import DeviceCodes, WaitingDevice
 from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
-from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
+from action_assistant.web.auth.people_files import NAME_LIMIT, PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import OWNER, Role, rank
 from action_assistant.web.auth.standing import Standings
@@ -42,7 +42,6 @@ from action_assistant.web.http.problems import PROBLEM_JSON, problem_of
 from action_assistant.web.network.addresses import Addresses
 
 _BODY: Final = 10_000  # bytes; strangers send it
-_NAME: Final = 60  # characters
 _TRIES_AT_ONCE: Final = 60  # of one address: a class may sit behind one
 _TRIES_PER_MINUTE: Final = 30  # after that
 _DEVICE_SECONDS: Final = 400 * 24 * 3600  # browsers keep none for longer
@@ -58,7 +57,7 @@ class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     token: str | None = None
     invitation: Annotated[str, msgspec.Meta(max_length=200)] | None = None
-    name: Annotated[str, msgspec.Meta(max_length=_NAME)] | None = None
+    name: Annotated[str, msgspec.Meta(max_length=NAME_LIMIT)] | None = None
 
 
 class SignedIn(msgspec.Struct, frozen=True):
