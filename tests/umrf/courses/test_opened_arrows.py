@@ -51,7 +51,7 @@ def both(
     if any(count > 1 for count in ends.values()):
         return None
     tops = {each.action: each.levels[0].key for each in found.origins}
-    return arrows_taken(top, nested), arrows_taken_opened(top, found.graph, tops, flat)
+    return arrows_taken(top, nested), arrows_taken_opened(top, tops, found.graph, flat)
 
 
 def test_an_opened_course_takes_the_arrows_that_the_whole_graph_takes() -> None:

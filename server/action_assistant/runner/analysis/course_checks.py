@@ -3,6 +3,7 @@ cover. Runs in workers."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Final
 
 import msgspec
@@ -137,6 +138,7 @@ def _checked(
     was = codec.read(saved.umrf.encode()).graph
     script = script_from(msgspec.json.decode(saved.script))
     inside = inside or graphs_in(saved.subgraphs)
+    flat: Graph = now
     arrows_in: Callable[[Graph, Sequence[Trace]], TakenArrows] = arrows_taken
     if saved.opened:
         try:
@@ -144,12 +146,9 @@ def _checked(
         except CannotOpen as why:
             return msgspec.structs.replace(unchecked, same=False, why=str(why)), None
         tops = {name: levels[0].key for name, levels in found.paths.items()}
-        whole, now = now, found.graph
-
-        def arrows_in(flat: Graph, traces: Sequence[Trace]) -> TakenArrows:
-            return arrows_taken_opened(whole, flat, tops, traces)
-
-    check = check_expected(was, saved.course, script, now, inside, arrows_in)
+        flat = found.graph
+        arrows_in = partial(arrows_taken_opened, now, tops)
+    check = check_expected(was, saved.course, script, flat, inside, arrows_in)
     same = check.apart is None
     arrows = tuple(sorted(check.taken.arrows))
     course = msgspec.structs.replace(unchecked, same=same, why=check.why, taken=arrows)

@@ -96,11 +96,11 @@ def arrows_taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
 
 
 def arrows_taken_opened(
-    graph: Graph, flat: Graph, tops: Mapping[str, Key], traces: Iterable[Trace]
+    graph: Graph, tops: Mapping[str, Key], flat: Graph, traces: Iterable[Trace]
 ) -> TakenArrows:
     """Return the arrows of a graph that were taken, and its actions that ran, according to the trace events
     of a course with its sub-graphs opened. `flat`: the opened graph; `tops`: by the full name of each of
-    its actions the key of the action of `graph` in whose place it stands. An arrow after a sub-graph is
+    its actions the key of the action of `graph` in whose place it is. An arrow after a sub-graph is
     taken with the outcome of the action that ends the sub-graph: of the last one, where several have to."""
     top = {each.key: tops[each.full_name] for each in flat.actions} | {ENTRY: ENTRY, EXIT: EXIT}
     awaited: defaultdict[tuple[Key, Key], set[Key]] = defaultdict(set)
