@@ -17,7 +17,8 @@ from sqlalchemy import Column, select
 
 from action_assistant import settings
 from action_assistant.commands import maintenance
-from action_assistant.commands.client import Server, add_server, command, decoded, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, add_server, command, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.database import Branch

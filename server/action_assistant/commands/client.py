@@ -17,6 +17,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from action_assistant import paths, settings
+from action_assistant.commands.answers import decoded, kind_of, sentence
 from action_assistant.commands.runners import Runners
 from action_assistant.commands.stored_tokens import StoredToken, server_key, stored_token
 from action_assistant.errors import CannotStart, RequestRefused
@@ -172,27 +173,8 @@ def request(client: "httpx.Client", method: str, path: str, **body: Any) -> "htt
             "Is it running? Start it with `action-assistant serve`."
         ) from error
     if answer.is_error:
-        raise RequestRefused(sentence(answer), answer.status_code, _kind(answer))
+        raise RequestRefused(sentence(answer), answer.status_code, kind_of(answer))
     return answer
-
-
-def _kind(answer: "httpx.Response") -> str:
-    """Return the type of a refusal; an empty text if the body is no refusal of this program."""
-    try:
-        return str(answer.json()["type"])
-    except (ValueError, KeyError, TypeError):
-        return ""
-
-
-def sentence(answer: "httpx.Response") -> str:
-    """Return title and detail of a refusal in one line, with the place in the request if it names
-    one. If the body is no refusal of this program, return the URL and the status code."""
-    try:
-        problem = answer.json()
-        place = (problem.get("where") or {}).get("path", "")
-        return f"{problem['title']}: {problem['detail']}" + (f" (at {place})" if place else "")
-    except (ValueError, KeyError, AttributeError):
-        return f"{answer.request.url} answered {answer.status_code}."
 
 
 class _Found(NamedTuple):
@@ -475,17 +457,6 @@ def _scheme(port: int, trust: ssl.SSLContext) -> str:
     ):
         return "https"
     return "http"
-
-
-def decoded(answer: "httpx.Response", kind: type[T]) -> T:
-    """Decode the JSON body of an answer as this type. Raise CannotStart for a server whose answers
-    have another form."""
-    try:
-        return msgspec.json.decode(answer.content, type=kind)
-    except (ValueError, RecursionError) as error:
-        raise CannotStart(
-            f"{answer.request.url} answers in another form than this version expects ({error})."
-        ) from error
 
 
 def print_json(value: object) -> None:

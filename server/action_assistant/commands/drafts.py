@@ -4,7 +4,8 @@ import argparse
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
-from action_assistant.commands.client import Server, command, decoded, print_json, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, command, print_json, running
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference

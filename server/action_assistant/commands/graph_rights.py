@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Final
 
 import msgspec
 
-from action_assistant.commands.client import Server, add_server, decoded, print_json, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, add_server, print_json, running
 from action_assistant.commands.folders import folder_id, known_folders, tell_runner_rules
 from action_assistant.errors import RequestRefused
 from action_assistant.safe_text import one_line

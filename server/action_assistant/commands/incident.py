@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import msgspec
 
-from action_assistant.commands.client import Server, add_server, decoded, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, add_server, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.private_files import opener
 from action_assistant.safe_text import one_line

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 
 from action_assistant import paths
+from action_assistant.commands.answers import decoded
 from action_assistant.commands.client import (
     RunnerUrls,
     Server,
     command,
-    decoded,
     print_json,
     request,
     running,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final, get_args
 
 import msgspec
 
+from action_assistant.commands.answers import decoded
 from action_assistant.commands.client import (
     Server,
     add_server,
     command,
-    decoded,
     names_server,
     print_json,
     running,

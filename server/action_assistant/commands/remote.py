@@ -11,13 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import msgspec
 
 from action_assistant.commands import queue, repeats
-from action_assistant.commands.client import (
-    Server,
-    add_server,
-    decoded,
-    print_json,
-    running,
-)
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, add_server, print_json, running
 from action_assistant.commands.folders import folder_id, known_folders
 from action_assistant.commands.stop import ENDED
 from action_assistant.errors import CannotStart, RequestRefused

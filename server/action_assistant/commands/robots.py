@@ -10,7 +10,8 @@ from urllib.parse import quote
 
 import msgspec
 
-from action_assistant.commands.client import Server, command, decoded, print_json, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, command, print_json, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.runner.links.hardware_stop import HardwareStop
 from action_assistant.runner.links.health import HealthCheck

@@ -9,8 +9,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict
 from urllib.parse import unquote
 
-import msgspec
-
+from action_assistant.commands.answers import decoded
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.settings import Site
@@ -120,13 +119,18 @@ class Runners:
         with ThreadPoolExecutor(len(self.sites)) as pool:
             return list(pool.map(ask, self.sites))
 
-    def _heard(self, site: Site, method: str, path: str, **body: Any) -> Heard:
+    def _heard(
+        self, site: Site, method: str, path: str, kind: type[Any] | None = None, **body: Any
+    ) -> Heard:
         try:
-            return Heard(site, self._send(method, site.url + path, **body), None)
+            answer = self._send(method, site.url + path, **body)
+            if kind is not None:
+                decoded(answer, kind)
+            return Heard(site, answer, None)
         except (RequestRefused, CannotStart) as error:
             return Heard(site, None, error)
 
-    def _answers(self, path: str, kind: object) -> SimpleQueue[Heard]:
+    def _answers(self, path: str, kind: type[Any]) -> SimpleQueue[Heard]:
         """Get a path from all sites at once, and return the queue into which each puts its answer, so
         that nobody waits for a site that hangs. An answer that is not of this kind is none."""
         answers: SimpleQueue[Heard] = SimpleQueue()
@@ -134,7 +138,7 @@ class Runners:
         def ask(site: Site) -> None:
             heard = Heard(site, None, CannotStart(f"{site.url} could not be asked."))
             try:
-                heard = _readable(self._heard(site, "GET", path), kind)
+                heard = self._heard(site, "GET", path, kind)
             finally:
                 answers.put(heard)
 
@@ -263,18 +267,6 @@ class Runners:
         if len(found) > 1:
             raise RequestRefused(_of_several(homes))
         return next(iter(found), None)
-
-
-def _readable(heard: Heard, kind: object) -> Heard:
-    """Return an answer, or an error in its place if its JSON is not of this type."""
-    if heard.answer is None:
-        return heard
-    try:
-        msgspec.json.decode(heard.answer.content, type=kind)
-    except (ValueError, RecursionError) as error:
-        said = f"{heard.answer.request.url} answers in another form than this version expects ({error})."
-        return Heard(heard.site, None, CannotStart(said))
-    return heard
 
 
 def _of_several(homes: Mapping[str, list[Site]]) -> str:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import msgspec
 
 from action_assistant import settings
+from action_assistant.commands.answers import decoded
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.commands.client import (
     Server,
     add_server,
     command,
-    decoded,
     print_json,
     refused,
     running,

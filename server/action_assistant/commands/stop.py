@@ -8,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
 from typing import Final, NamedTuple, NotRequired, TypedDict, TypeVar
 
-from action_assistant.commands.client import Server, add_server, decoded, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, add_server, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 

@@ -21,7 +21,8 @@ from httpx_ws import (
 from pycrdt import Doc, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.commands.client import add_server, reach, running, sentence
+from action_assistant.commands.answers import sentence
+from action_assistant.commands.client import add_server, reach, running
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents import document
 from action_assistant.errors import CannotStart, RequestRefused

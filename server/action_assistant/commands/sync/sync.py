@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec.structs import replace
 
-from action_assistant.commands.client import Server, add_server, decoded, running
+from action_assistant.commands.answers import decoded
+from action_assistant.commands.client import Server, add_server, running
 from action_assistant.commands.directories import why
 from action_assistant.commands.sync.folder import Folder, SyncedFile, sha
 from action_assistant.errors import CannotStart, Overtaken, RequestRefused
