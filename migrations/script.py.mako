@@ -9,6 +9,8 @@ revision: str = ${repr(up_revision)}
 down_revision: str | None = ${repr(down_revision)}
 branch_labels: Sequence[str] | None = ${repr(branch_labels)}
 depends_on: Sequence[str] | None = ${repr(depends_on)}
+# Whether editors of the revision before can go on beside it (CONTRIBUTING.md, Migrations).
+expands: bool = False
 
 
 def upgrade() -> None:

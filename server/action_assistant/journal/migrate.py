@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: The pattern of the names of our revisions, also of later ones; a script's file begins with its name.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
+#: Says in a script that programs of the revision before it can read and write the tables after it.
+_EXPANDS: Final = re.compile(r"^expands: bool = True$", re.MULTILINE)
 log: Final = logging.getLogger(__name__)
 logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
 # The table is the same for both branches.
@@ -45,6 +47,15 @@ def steps_after(branch: str, revision: str) -> list[str]:
     folder = paths.migrations() / branch
     names = [path.stem for each in later for path in folder.glob(f"{each}_*.py")]
     return [name.split("_", 2)[2].replace("_", " ") for name in names]
+
+
+def only_expands(branch: str, revision: str) -> bool:
+    """Return whether programs of this revision can go on while the tables of a branch are brought to this
+    version: each script in between says `expands: bool = True`."""
+    later = revisions_of(branch)[revisions_of(branch).index(revision) + 1 :]
+    folder = paths.migrations() / branch
+    scripts = [path for each in later for path in folder.glob(f"{each}_*.py")]
+    return all(_EXPANDS.search(path.read_text()) for path in scripts)
 
 
 def upgrade_to(

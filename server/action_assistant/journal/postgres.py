@@ -27,7 +27,7 @@ from action_assistant.journal.failover import (
     failover_of,
     hosts_of,
 )
-from action_assistant.journal.migrate import kept_as_it_is, upgrade_to
+from action_assistant.journal.migrate import kept_as_it_is, only_expands, upgrade_to
 from action_assistant.journal.slots import SLOTS, ends_of_slots, slot_of
 from action_assistant.schema.editor_tables import editor_event
 
@@ -530,12 +530,14 @@ async def _until(ask: Callable[[], Awaitable[bool]], why_not: str) -> None:
 
 def _alone(before: Before) -> Before:
     """Return a function that is called before tables change, and refuses that while other editors use
-    them; else it calls `before`."""
+    them, unless these can go on; else it calls `before`."""
 
     def check(connection: Connection, branch: Branch, revision: str) -> None:
-        if connection.exec_driver_sql(_EDITORS).scalar_one() > 1:
+        beside = connection.exec_driver_sql(_EDITORS).scalar_one() > 1
+        if beside and not only_expands(branch, revision):
             raise CannotStart(
-                "This version has to change the tables, but other editors use them: end those first."
+                "This version has to change the tables, but other editors use them and could not go on: end "
+                "those first."
             )
         before(connection, branch, revision)
 

@@ -28,6 +28,7 @@ class OneOfSeveral(Editor):
         super().__init__(data, database)
         self._host = host
         self._flags = ["--host", host, *flags]
+        self.program = ["-m", "action_assistant"]
         self.inner = f"127.0.0.1:{free_ports()}"
         self.log = data.parent / f"editor-{number}.log"
         self.database = database
@@ -50,7 +51,7 @@ class OneOfSeveral(Editor):
         given = {**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN, **environ}
         given["ACTION_ASSISTANT_LIMITS"] = "off"
         with self.log.open("ab") as out:
-            command = [sys.executable, "-m", "action_assistant", *words]
+            command = [sys.executable, *self.program, *words]
             self._child = subprocess.Popen(command, env=given, stdout=out, stderr=out)
 
     def wait(self) -> None:

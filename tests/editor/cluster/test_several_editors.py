@@ -5,7 +5,7 @@ import contextlib
 import os
 import random
 import signal
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
@@ -256,7 +256,9 @@ _GIVE_UP_S = 3600.0
 
 
 async def lived_through(
-    editors: list[OneOfSeveral], fault: Callable[[], Awaitable[None]], database: str
+    editors: list[OneOfSeveral],
+    fault: Callable[[], Coroutine[Any, Any, None]],
+    database: str,
 ) -> None:
     """Let people at all editors write into three graphs before, during and after a fault, and check that
     everybody has everything, once, and that each room is what its log says."""
@@ -270,16 +272,18 @@ async def lived_through(
     }
     everybody = [each for some in people.values() for each in some]
 
-    async def write(seconds: float) -> None:
+    async def write(seconds: float, meanwhile: "asyncio.Task[None] | None" = None) -> None:
         until_then = asyncio.get_running_loop().time() + seconds
-        while asyncio.get_running_loop().time() < until_then:
+        while asyncio.get_running_loop().time() < until_then or (
+            meanwhile and not meanwhile.done()
+        ):
             random.choice(everybody).write()
             await asyncio.sleep(0.03)
 
     await write(2)
-    writing = asyncio.create_task(write(8))
-    await fault()
-    await writing
+    happening = asyncio.create_task(fault())
+    await write(8, happening)
+    await happening
     await write(2)
     try:
         for graph, some in people.items():
