@@ -130,6 +130,7 @@ export function unlikeChosen(run: string, chosen: readonly string[]): string {
 
 interface RunRowProps {
   run: RunOfList;
+  /** The present by the clock of the run's runner. */
   now: number;
   chosen: boolean;
   /** Why it cannot be chosen; "" if it can. */
@@ -190,7 +191,7 @@ function Row({ run, now, chosen, unlike, onChoose, before }: RunRowProps) {
         {!run.hidden && run.cause && <span className={style.cause}>{run.cause}</span>}
       </td>
       <td className={style.course}>
-        {!run.hidden && <CourseBar run={run} now={now - shiftOfRun(run.id)} />}
+        {!run.hidden && <CourseBar run={run} now={now} />}
       </td>
       <td className={style.fact}>
         {runPlace(run)}
