@@ -195,6 +195,17 @@ test("Stop of a run of an unknown site goes to each, and is not refused while on
   expect(live.state.stops.map(({ state }) => state)).toEqual(["heard"]);
 });
 
+test("a Stop of a run of an unknown site that one site may not take is refused, whoever is silent", async () => {
+  const problem = { ...NONE, status: 403, type: "forbidden", detail: "Not from here." };
+  vi.stubGlobal("fetch", async (url: string) => {
+    if (url.startsWith(A.url)) return Response.json(problem, problem);
+    throw new TypeError("no answer");
+  });
+  live.stop("nobody-knows");
+  await vi.advanceTimersByTimeAsync(500);
+  expect(live.state.stops).toMatchObject([{ state: "refused", detail: "Not from here." }]);
+});
+
 test("what one site says wrongly keeps no Stop from the other, and is not known any more", () => {
   const said = vi.spyOn(console, "error").mockImplementation(() => undefined);
   for (const message of [

@@ -162,8 +162,8 @@ const FARNESS = ["refused", "unheard", "asked", "heard"] as const;
 
 function joinedStop(parts: readonly { name: string; stop: StopRequest }[]): StopRequest {
   const stops = parts.map(({ stop }) => stop);
-  // A run is at one site: the others refuse a Stop of it, which says nothing of a site that is still asked.
-  const may = stops.filter(({ state }) => stops[0]?.run === "all" || state !== "refused");
+  // A run is at one site: that the others do not have it says nothing of a site that is still asked.
+  const may = stops.filter(({ state, isAbsent }) => state !== "refused" || !isAbsent);
   const has = may.filter(({ state }) => stops[0]?.run !== "all" && state === "heard");
   const counted = [has, may].find((each) => each.length > 0) ?? stops;
   const worst = FARNESS.flatMap((state) => counted.filter((stop) => stop.state === state))[0];

@@ -3,7 +3,7 @@ import { pageClock, ServerOffset, tick } from "../clock/server-clock";
 import { isEqual, newAid } from "../graph/stop-basics";
 import { runnerOnlyAt } from "./client";
 import type { AskedConfirmation } from "./confirmations";
-import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
+import { errorText, isFinal, isSignedIn, Refusal, sessionEnd } from "./http";
 import { isPieceOf } from "./led-runs";
 import { isBlocked } from "./page-url";
 import type { HeldGraph, Robot } from "./robots";
@@ -32,6 +32,8 @@ export interface StopRequest {
    */
   state: "asked" | "heard" | "refused" | "unheard";
   detail: string;
+  /** Set if it is refused since this runner has no such run. */
+  isAbsent?: true;
   /** The tick at which the runner had it. */
   heardAt?: number;
   /** The tick at which all that it is about was told to rest: that stays proven, whatever is unknown later. */
@@ -165,7 +167,13 @@ export class LiveSocket {
     for (let sent = first; ; sent = this.#sendStop(run, id)) {
       await sent.then(
         () => this.#answerStop(id, "heard", ""),
-        (error) => this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error)),
+        (error) =>
+          this.#answerStop(
+            id,
+            isFinal(error) ? "refused" : "unheard",
+            errorText(error),
+            error instanceof Refusal && error.details.status === 404,
+          ),
       );
       const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
@@ -315,7 +323,7 @@ export class LiveSocket {
         this.#answerStop(message.stop_id, "heard", "");
         break;
       case "refused":
-        this.#answerStop(message.stop_id, "refused", message.detail);
+        this.#answerStop(message.stop_id, "refused", message.detail, true);
         break;
       case "confirm":
         this.#set({ asked: message.asked });
@@ -383,14 +391,15 @@ export class LiveSocket {
     this.#set({ stops: [...kept, stop] });
   }
 
-  #answerStop(id: string, state: StopRequest["state"], detail: string): void {
+  #answerStop(id: string, state: StopRequest["state"], detail: string, isAbsent = false): void {
     const heard = state === "heard" && { heardAt: tick() };
     const stops = this.state.stops.map((stop) => {
       if (stop.id !== id || stop.state === "heard") return stop;
       // What began until it was heard is stopped by it as well.
       const late = heard && stop.run === "all" && tick() - stop.at > AGAIN;
       const more = late ? openRuns(this.state).map((run) => run.id) : [];
-      return { ...stop, state, detail, ...heard, runs: [...new Set([...stop.runs, ...more])] };
+      const runs = [...new Set([...stop.runs, ...more])];
+      return { ...stop, state, detail, ...heard, ...(isAbsent && { isAbsent }), runs };
     });
     this.#set({ stops });
   }

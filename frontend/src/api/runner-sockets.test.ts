@@ -1,7 +1,7 @@
 /** The sockets of all runners behind one, also without what joins them, and while runners come and go. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { serverNow } from "../clock/server-clock";
-import { noticeOfSites, runnerNotice, withOwnStops } from "../runs/stop/stop-notice";
+import { wholeNotice } from "../runs/stop/stop-notice";
 import { progressByAid } from "../status/progress";
 import { Wire } from "../testing/wire";
 import { runnerAt } from "./client";
@@ -31,13 +31,8 @@ const wireOf = (url: string): Wire => {
 };
 const hello = (url: string, ...runs: object[]) =>
   wireOf(url).say({ type: "hello", engines: [], runs });
-const said = ({ sites = [] }: LiveState) =>
-  noticeOfSites(
-    sites.map(({ site: { name }, state }) => ({
-      name,
-      notice: runnerNotice(withOwnStops(state, sites), new Set(), performance.now()),
-    })),
-  )?.text.replace(/[\u2066-\u2069]/g, "");
+const said = (now: LiveState) =>
+  wholeNotice(now, new Set(), performance.now())?.text.replace(/[\u2066-\u2069]/g, "");
 
 /** The URLs to which Stops were posted, and the ids of these Stops. */
 let posted: { url: string; id: string }[];

@@ -31,7 +31,15 @@ function runSince(begin: number): RunOfList {
   const half = at(begin + MINUTE / 2 + 500);
   const visit = { from: half, not_before: half, until: null, not_after: null, result: null };
   return {
-    ...{ id: "r", number: 1, graph: "g", graph_name: "walk", version: "v", digest: "d", engine: "Dora" },
+    ...{
+      id: "r",
+      number: 1,
+      graph: "g",
+      graph_name: "walk",
+      version: "v",
+      digest: "d",
+      engine: "Dora",
+    },
     ...{ state: "running", desired: "running", ended_at: null, unknown_since: null, alarms: [] },
     ...{ requested_at: at(begin), started_at: at(begin), author: { id: "a", name: "Ada" } },
     actions: { Walk_0: { aid: "a", state: "RUNNING", count: 1, older: 0, visits: [visit] } },

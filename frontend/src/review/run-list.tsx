@@ -190,9 +190,7 @@ function Row({ run, now, chosen, unlike, onChoose, before }: RunRowProps) {
         <StateLabel tone={tone} word={word} />
         {!run.hidden && run.cause && <span className={style.cause}>{run.cause}</span>}
       </td>
-      <td className={style.course}>
-        {!run.hidden && <CourseBar run={run} now={now} />}
-      </td>
+      <td className={style.course}>{!run.hidden && <CourseBar run={run} now={now} />}</td>
       <td className={style.fact}>
         {runPlace(run)}
         {siteName(run.id)}

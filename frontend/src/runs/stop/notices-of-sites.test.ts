@@ -1,61 +1,92 @@
 import { expect, test } from "vitest";
-import type { LiveState, StopRequest } from "../../api/live-socket";
-import { headOf, noticeKey, noticeOf, noticeOfSites, withOwnStops } from "./stop-notice";
+import type { LiveState, SiteState, StopRequest } from "../../api/live-socket";
+import type { Run } from "../../api/runs";
+import { headOf, noticeKey, noticeOf, wholeNotice } from "./stop-notice";
+
+const NONE: ReadonlySet<string> = new Set();
+
+const stop = (state: StopRequest["state"], run = "all", more: object = {}): StopRequest => ({
+  ...{ id: "s", run, at: 0, runs: [], state, detail: "A fault." },
+  ...more,
+});
+const live = (link: LiveState["link"], ...stops: StopRequest[]): LiveState => ({
+  ...{ link, since: 0, engines: [], runs: new Map(), stops, asked: [] },
+});
+const withRun = (state: LiveState, part: object): LiveState => {
+  const run = { id: "r", number: 1, state: "running", ended_at: null, alarms: [], engine: "Carl" };
+  return { ...state, runs: new Map([["r", { ...run, ...part } as unknown as Run]]) };
+};
+const named = (name: string, state: LiveState): SiteState => ({ site: { name, url: name }, state });
+const whole = (sites: readonly SiteState[], at = 2_000) =>
+  wholeNotice({ ...live("live"), sites }, NONE, at);
+const plain = (text: string | undefined) => text?.replace(/[\u2066-\u2069]/g, "");
+
+const ENDED = { state: "stopped", ended_at: "1970-01-01T00:00:01Z" };
+const UNCONFIRMED = { desired: "stopped", unconfirmed: "no proof" };
 
 test("one notice says of each site what it has to, the loudest first, and names it", () => {
-  const joined = noticeOfSites([
-    { name: "Hall A", notice: { tone: "done", text: "Run 1: stopped." } },
-    {
-      name: "Hall B",
-      notice: { tone: "loud", stays: true, text: "NOT SENT: use the hardware stop." },
-    },
-    { name: "Hall C", notice: null },
+  const a = withRun(live("live", stop("heard", "r", { provenAt: 1_000 })), ENDED);
+  const joined = whole([
+    named("Hall A", a),
+    named("Hall B", live("live", stop("unheard"))),
+    named("Hall C", live("live")),
   ]);
-  expect(joined).toEqual({
-    tone: "loud",
-    stays: true,
-    text: "NOT SENT at Hall B: use the hardware stop. Hall A: Run 1: stopped.",
-  });
-  expect(joined && headOf(joined)).toBe("NOT SENT at Hall B");
-  expect(noticeOfSites([{ name: "Hall A", notice: null }])).toBeNull();
+  expect(joined).toMatchObject({ tone: "loud", stays: true });
+  expect(plain(joined?.text)).toBe(
+    "NOT SENT at Hall B: use the hardware stop. A fault. Trying again. Hall A: Run 1: stopped.",
+  );
+  expect(plain(joined ? headOf(joined) : "")).toBe("NOT SENT at Hall B");
+  expect(whole([named("Hall A", live("live"))])).toBeNull();
 });
 
 test("a notice that was put aside comes again with what another site has to say", () => {
-  const loud = (text: string) => ({ tone: "loud", stays: true, text }) as const;
-  const ofA = { name: "Hall A", notice: loud("STOP UNCONFIRMED: run 1 on Carl: no proof.") };
-  const shown = [
-    null,
-    loud("STOP UNCONFIRMED: patrol on Dora: no proof."),
-    loud("STOP MAY REACH NOBODY: The runner does not answer."),
-  ].map((notice) => noticeOfSites([ofA, { name: "Hall B", notice }]));
+  const a = named("Hall A", withRun(live("live"), UNCONFIRMED));
+  const others = [
+    live("live"),
+    withRun(live("live"), { ...UNCONFIRMED, number: 2 }),
+    { ...live("down"), unreached: { kind: "silent", why: "Nobody answers." } } as const,
+  ];
+  const shown = others.map((state) => whole([a, named("Hall B", state)], 9_000));
   const keys = shown.map((notice) => notice && noticeKey(notice));
   expect(new Set(keys).size).toBe(3);
-  expect(shown[2] && headOf(shown[2])).toBe(
+  expect(plain(shown[2] ? headOf(shown[2]) : "")).toBe(
     "STOP UNCONFIRMED at Hall A · STOP MAY REACH NOBODY at Hall B",
   );
 });
 
-const stop = (state: StopRequest["state"], run = "all"): StopRequest => ({
-  ...{ id: "s", run, at: 0, runs: [], state, detail: "There is no such run." },
-});
-const site = (link: LiveState["link"], ...stops: StopRequest[]): LiveState => ({
-  ...{ link, since: 0, engines: [], runs: new Map(), stops, asked: [] },
+test("each of several Stops that are not dealt with at one site names it, also in the headline", () => {
+  const unsent = stop("unheard", "q", { id: "u" });
+  const b = withRun(live("live", unsent, stop("heard", "r")), { number: 2 });
+  const notice = whole([named("Hall A", live("live")), named("Hall B", b)], 9_000);
+  expect(plain(notice?.text)).toMatch(/STOP UNCONFIRMED at Hall B: run 2 .*NOT SENT at Hall B: /);
+  expect(plain(notice ? headOf(notice) : "")).toBe(
+    "STOP UNCONFIRMED at Hall B · NOT SENT at Hall B",
+  );
 });
 
 test("a site that has said nothing yet is not said to run nothing", () => {
-  const said = (at: number) => noticeOf(stop("heard"), site("connecting"), at);
+  const said = (at: number) => noticeOf(stop("heard"), live("connecting"), at);
   expect(said(500)).toMatchObject({ tone: "quiet", text: "Stop sent" });
   expect(said(4_000)).toMatchObject({ tone: "loud" });
-  expect(noticeOf(stop("heard"), site("live"), 500)?.text).toMatch(/nothing runs/);
+  expect(noticeOf(stop("heard"), live("live"), 500)?.text).toMatch(/nothing runs/);
 });
 
+/** Which of two sites are said to refuse the same Stop. */
+function refusing(a: StopRequest, b: StopRequest): string[] {
+  const sites = [named("A", live("live", a)), named("B", live("live", b))];
+  const said = plain(whole(sites)?.text) ?? "";
+  return ["A", "B"].filter((name) => said.includes(`Stop refused at ${name}:`));
+}
+
 test("a site that does not have the run refuses no Stop that another one takes", () => {
-  const named = (state: LiveState, name: string) => ({ site: { name, url: name }, state });
-  const stopsAt = (a: StopRequest, b: StopRequest) => {
-    const sites = [named(site("live", a), "A"), named(site("live", b), "B")];
-    return sites.map(({ state }) => withOwnStops(state, sites).stops.length);
-  };
-  expect(stopsAt(stop("refused", "r"), stop("heard", "r"))).toEqual([0, 1]);
-  expect(stopsAt(stop("refused", "r"), stop("refused", "r"))).toEqual([1, 1]);
-  expect(stopsAt(stop("refused"), stop("heard"))).toEqual([1, 1]); // all: it is refused there
+  const absent = stop("refused", "r", { isAbsent: true });
+  expect(refusing(absent, stop("heard", "r"))).toEqual([]);
+  expect(refusing(absent, stop("unheard", "r"))).toEqual([]);
+  expect(refusing(absent, absent)).toEqual(["A", "B"]);
+  expect(refusing(stop("refused"), stop("heard"))).toEqual(["A"]); // all: it is refused there
+});
+
+test("a site that may have the run and refuses its Stop says so while another one is silent", () => {
+  expect(refusing(stop("refused", "r"), stop("unheard", "r"))).toEqual(["A"]);
+  expect(refusing(stop("refused", "r"), stop("heard", "r"))).toEqual([]);
 });

@@ -9,8 +9,8 @@ import {
   noticeKey,
   noticeOf,
   othersNotice,
-  runnerNotice,
   unreachableNotice,
+  wholeNotice,
 } from "./stop-notice";
 
 const stop: StopRequest = { id: "s", run: "r", at: 1000, runs: [], state: "heard", detail: "" };
@@ -243,31 +243,40 @@ const proven: StopRequest = { ...stop, id: "p", run: "q", at: 1500, provenAt: 20
 
 test("a Stop that was not sent stays in sight beside a later one that is proven, and says its run", () => {
   for (const dismissed of [NONE, new Set(["u"])]) {
-    const notice = runnerNotice(withStops(unsent, proven), dismissed, 2500);
+    const notice = wholeNotice(withStops(unsent, proven), dismissed, 2500);
     expect(notice).toMatchObject({ tone: "loud", stays: true });
     expect(notice?.text).toMatch(/^NOT SENT: .*run 7 on David\. Run 8: stopped\.$/);
-    expect(runnerNotice(withStops(unsent, proven), dismissed, 60_000)?.text).toMatch(/^NOT SENT/);
+    expect(wholeNotice(withStops(unsent, proven), dismissed, 60_000)?.text).toMatch(/^NOT SENT/);
   }
   const refused: StopRequest = { ...unsent, state: "refused" };
-  expect(runnerNotice(withStops(refused, proven), NONE, 60_000)?.text).toMatch(/^Stop refused/);
-  expect(runnerNotice(withStops(refused, proven), new Set(["u"]), 60_000)).toBeNull();
+  expect(wholeNotice(withStops(refused, proven), NONE, 60_000)?.text).toMatch(/^Stop refused/);
+  expect(wholeNotice(withStops(refused, proven), new Set(["u"]), 60_000)).toBeNull();
 });
 
 test("a Stop that is unconfirmed stays in sight beside a later one that is proven", () => {
-  const notice = runnerNotice(withStops(stop, proven), NONE, 5000);
+  const notice = wholeNotice(withStops(stop, proven), NONE, 5000);
   expect(notice?.text).toMatch(/^STOP UNCONFIRMED: run 7 .* Run 8: stopped\.$/);
-  const two = runnerNotice(withStops(stop, { ...unsent, run: "q", at: 1500 }), NONE, 5000);
+  const two = wholeNotice(withStops(stop, { ...unsent, run: "q", at: 1500 }), NONE, 5000);
   expect(two && headOf(two)).toBe("NOT SENT · STOP UNCONFIRMED");
+});
+
+test("a later STOP ALL covers no run whose loss left its Stop unconfirmed", () => {
+  const detail = "The engine was restarted while the run went on.";
+  const lost = now({ state: "lost", ended_at: "1970-01-01T00:00:02Z", detail });
+  const all: StopRequest = { ...stop, id: "a", run: "all", at: 50_000, provenAt: 51_000 };
+  const notice = wholeNotice({ ...lost, stops: [stop, all] }, NONE, 60_000);
+  expect(notice).toMatchObject({ tone: "loud" });
+  expect(notice?.text).toMatch(/^STOP UNCONFIRMED: run 7 on David: The engine was restarted/);
 });
 
 test("a later Stop of the same run, of its group or of everything takes the place of an earlier one", () => {
   for (const run of ["r", "both", "all"]) {
     const later: StopRequest = { ...stop, id: "l", run, at: 1500, runs: ["r"] };
-    const said = runnerNotice(withStops(unsent, later), NONE, 2500);
+    const said = wholeNotice(withStops(unsent, later), NONE, 2500);
     expect(said).toMatchObject({ tone: "quiet", text: "Stopping run 7 …" });
   }
   const all: StopRequest = { ...unsent, run: "all", runs: ["r"] };
-  const said = runnerNotice(withStops(all, { ...stop, at: 1500 }), NONE, 2500);
+  const said = wholeNotice(withStops(all, { ...stop, at: 1500 }), NONE, 2500);
   expect(said?.text).toMatch(/^NOT SENT: .* Stopping run 7 …$/);
 });
 
@@ -275,9 +284,9 @@ test("a Stop of somebody else that is unconfirmed stays in sight beside one's ow
   const { runs, ...state } = withStops(proven);
   const theirs = { ...runs.get("r"), desired: "stopped", unconfirmed: "no answer" } as Run;
   const both = { ...state, runs: new Map(runs).set("r", theirs) };
-  const notice = runnerNotice(both, NONE, 2500);
+  const notice = wholeNotice(both, NONE, 2500);
   expect(notice).toMatchObject({ tone: "loud", stays: true });
   expect(notice?.text).toMatch(/^STOP UNCONFIRMED: run 7 .* Run 8: stopped\.$/);
-  const mine = runnerNotice({ ...both, stops: [stop] }, NONE, 2500);
+  const mine = wholeNotice({ ...both, stops: [stop] }, NONE, 2500);
   expect(mine?.text).toBe("Stopping run 7 …"); // its own notice tells of it, in time
 });

@@ -31,14 +31,16 @@ const GONE = 6_000; // ms that a proven stop stays to be read
 const MOST_SILENT = 3; // robots that can be said to be at rest from here; each run says so of its own
 
 /** `since` goes on with each moment, so it is seen but not announced again and again. */
-export type StopNoticeText = {
+interface Notice {
   tone: "quiet" | "loud" | "done";
   text: string;
   since?: string;
   stays?: true;
-  /** The loud notices of which it consists, where there are several sites. */
+  /** The loud notices of which it consists, where there are several. */
   loud?: readonly { text: string }[];
-} | null;
+}
+
+export type StopNoticeText = Notice | null;
 
 /** Return the runner's reason why the Stop is not proven; "" before it has given one. */
 function reasonOf(run: Run): string {
@@ -222,14 +224,19 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
 }
 
 /**
- * Return the state of a site without the Stops that are none of its: a run is at one site, and the others
- * refuse a Stop of it.
+ * Return the state of a site without the Stops that are none of its: a run is at one site, and the others do not
+ * have it. What a site refuses for another reason stays in sight until another site has heard the Stop.
  */
-export function withOwnStops(now: LiveState, sites: readonly SiteState[]): LiveState {
-  const isElsewhere = ({ id, run, state: said }: StopRequest) =>
+function withOwnStops(now: LiveState, sites: readonly SiteState[]): LiveState {
+  const isElsewhere = ({ id, run, state: said, isAbsent }: StopRequest) =>
     said === "refused" &&
     run !== "all" &&
-    sites.some(({ state }) => state.stops.some((stop) => stop.id === id && stop.state !== said));
+    sites.some(({ state: { stops } }) =>
+      stops.some(
+        ({ id: other, state }) =>
+          other === id && (state === "heard" || (isAbsent && state !== "refused")),
+      ),
+    );
   return { ...now, stops: now.stops.filter((stop) => !isElsewhere(stop)) };
 }
 
@@ -258,8 +265,10 @@ function isCovered(stop: StopRequest, later: readonly StopRequest[], now: LiveSt
   return later.some(means);
 }
 
+const TONES = ["loud", "quiet", "done"] as const;
+
 /** Return one notice of several, the worst first: none hides another one. */
-function worstFirst(notices: readonly NonNullable<StopNoticeText>[]): StopNoticeText {
+function worstFirst(notices: readonly Notice[]): StopNoticeText {
   const worst = TONES.flatMap((tone) => notices.filter((notice) => notice.tone === tone));
   const [first, ...others] = worst;
   if (first === undefined || others.length === 0) return first ?? null;
@@ -280,12 +289,10 @@ function textOf(stop: StopRequest, text: string, now: LiveState): string {
   return runs.length === 0 ? text : `${text} This is about ${runs.join(", ")}.`;
 }
 
-/** Return the notice of one runner. `dismissed`: as for `toldStops`. */
-export function runnerNotice(
-  now: LiveState,
-  dismissed: ReadonlySet<string>,
-  at: number,
-): StopNoticeText {
+/** Return the notices of one runner. `dismissed`: as for `toldStops`. */
+function noticesOf(now: LiveState, dismissed: ReadonlySet<string>, at: number): readonly Notice[] {
+  const moving = movingAgain(now);
+  if (moving !== null) return [moving];
   const own = toldStops(now, dismissed).flatMap((stop) => {
     const notice = noticeOf(stop, now, at);
     return notice === null ? [] : [{ stop, notice }];
@@ -295,38 +302,34 @@ export function runnerNotice(
   const told = own.map(({ stop, notice }) =>
     isOne ? notice : { ...notice, text: textOf(stop, notice.text, now) },
   );
-  return (
-    movingAgain(now) ??
-    worstFirst(others === null ? told : [...told, others]) ??
-    unreachableNotice(now, at)
-  );
+  const all = others === null ? told : [...told, others];
+  const unreachable = unreachableNotice(now, at);
+  return all.length > 0 || unreachable === null ? all : [unreachable];
 }
 
-const TONES = ["loud", "quiet", "done"] as const;
-
-/** Return one notice of those of several sites, the loudest first: each says at which site it is. */
-export function noticeOfSites(
-  parts: readonly { readonly name: string; readonly notice: StopNoticeText }[],
+/**
+ * Return one notice of all that there is to say of Stops; with several sites each part says at which it is.
+ * `dismissed`: as for `toldStops`.
+ */
+export function wholeNotice(
+  now: LiveState,
+  dismissed: ReadonlySet<string>,
+  at: number,
 ): StopNoticeText {
-  const told = TONES.flatMap((tone) => parts.filter(({ notice }) => notice?.tone === tone));
-  const [first] = told;
-  if (first === undefined || first.notice === null) return null;
-  const said = told.map(({ name, notice }) => ({
-    text: atSite(notice?.text ?? "", isolated(name)),
-  }));
-  const stays = told.some(({ notice }) => notice?.stays);
-  const loud = said.filter((_, i) => told[i]?.notice?.tone === "loud");
-  return {
-    ...first.notice,
-    text: said.map(({ text }) => text).join(" "),
-    ...(stays && { stays }),
-    ...(loud.length > 1 && { loud }),
-  };
+  const { sites } = now;
+  if (sites === undefined) return worstFirst(noticesOf(now, dismissed, at));
+  const told = sites.flatMap(({ site: { name }, state }) =>
+    noticesOf(withOwnStops(state, sites), dismissed, at).map((notice) => ({
+      ...notice,
+      text: atSite(notice.text, isolated(name)),
+    })),
+  );
+  return worstFirst(told) ?? unreachableNotice(now, at);
 }
 
 function atSite(text: string, site: string): string {
   const [head = "", ...rest] = text.split(":");
-  const shouts = rest.length > 0 && /^[A-Z ]+$/.test(head);
+  const shouts = rest.length > 0 && /^([A-Z ]+|Stop refused)$/.test(head);
   return shouts ? `${head} at ${site}:${rest.join(":")}` : `${site}: ${text}`;
 }
 
@@ -432,15 +435,7 @@ export function StopNotice() {
       open > 0 || each.state !== "heard" || tick() - (each.provenAt ?? each.at) < GONE + 1000,
   );
   const at = useTick(200, busy || [now, ...states].some(({ link }) => link !== "live"));
-  const notice =
-    now.sites === undefined
-      ? runnerNotice(now, dismissed, at)
-      : (noticeOfSites(
-          now.sites.map(({ site: { name }, state }) => ({
-            name,
-            notice: runnerNotice(withOwnStops(state, now.sites ?? []), dismissed, at),
-          })),
-        ) ?? unreachableNotice(now, at));
+  const notice = wholeNotice(now, dismissed, at);
   const aside = useAside(notice, last?.id ?? "");
   const element = useNoticeRoom(notice?.tone === "loud" && !aside.is);
   useRootMark("data-notice-aside", aside.is && notice !== null);
