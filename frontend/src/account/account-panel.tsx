@@ -88,13 +88,17 @@ interface Props {
   onLeave: (person: string) => Promise<void>;
 }
 
+const UNPROVEN =
+  "STOP ALL is not proven. Once you sign out, this page sends it no more, and does not show what becomes of it. Press Sign out again to leave all the same.";
+
 export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const { person, rename } = usePerson();
-  const { runner } = useLive();
+  const { live, runner } = useLive();
   const mayLook = useMay("restore");
   const mayShare = useMay("share");
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
+  const [obstacle, setObstacle] = useState("");
   const save = async () => {
     try {
       await rename(name.trim());
@@ -104,12 +108,13 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
     }
   };
   const leave = async () => {
+    if (live?.isStopping && obstacle === "") return setObstacle(UNPROVEN);
     try {
       await signOut(runner);
       await onLeave(person.id);
       location.reload();
     } catch (error) {
-      setProblem(errorText(error));
+      setObstacle(errorText(error));
     }
   };
   return (
@@ -193,6 +198,11 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
         >
           Help
         </Button>
+        {obstacle !== "" && (
+          <p className="m-0 ink-error text-13" role="alert">
+            {obstacle}
+          </p>
+        )}
         <Button
           variant="default"
           leftSection={<IconLogout size={15} aria-hidden />}

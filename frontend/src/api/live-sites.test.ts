@@ -61,7 +61,7 @@ beforeEach(() => {
   });
   live = new RunnerSockets();
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   wireOf(A.url).say({
     type: "hello",
     engines: [robot("simulator", true), robot("Carl")],

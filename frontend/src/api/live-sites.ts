@@ -15,8 +15,9 @@ export class SitesJoiner implements Joiner {
   #parts: readonly Part[] = [];
   /** The robots of sites that have said them once, by URL: a name stays taken while its site is silent. */
   readonly #robots = new Map<string, ReadonlySet<string>>();
-  /** Runs and robots of a silent site as they are shown, by what the site said last. */
+  /** The shift of the clock of each site as it is shown: it changes only where it is off by `STEADY`. */
   readonly #shifts = new WeakMap<Part["socket"], number>();
+  /** Runs and robots of a silent site as they are shown, by what the site said last. */
   readonly #doubted = new WeakMap<object, { since: number; shown: Run | Robot }>();
 
   constructor() {
@@ -51,7 +52,7 @@ export class SitesJoiner implements Joiner {
     return { runSeenAt: joined("runSeenAt"), robotAnsweredAt: joined("robotAnsweredAt") };
   }
 
-  having(run: string): readonly Part[] {
+  partsWith(run: string): readonly Part[] {
     const having = this.#parts.filter(({ socket: { state } }) =>
       [...state.runs.values()].some((each) => each.id === run || each.group === run),
     );
@@ -60,7 +61,7 @@ export class SitesJoiner implements Joiner {
     return known === undefined ? this.#parts : [known];
   }
 
-  homeOf(run: string): Part | undefined {
+  partWith(run: string): Part | undefined {
     return this.#partOf(siteOfId(run));
   }
 

@@ -1,8 +1,9 @@
 /** How the page finds its runners, and hears of others while it is open. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Wire } from "../testing/wire";
-import { pageLink } from "./page-link";
-import { setSites } from "./sites";
+
+/** That of a page of its own for each test: a STOP ALL that is not proven outlives its person. */
+let pageLink: typeof import("./page-link")["pageLink"];
 
 const chunk = vi.hoisted(() => ({ fails: true }));
 vi.mock("./live-sites", async (original) => {
@@ -20,6 +21,8 @@ let posted: string[];
 const page = Object.assign(new EventTarget(), { hidden: false });
 
 beforeEach(async () => {
+  vi.resetModules();
+  ({ pageLink } = await import("./page-link"));
   vi.useFakeTimers();
   Wire.all = [];
   chunk.fails = true;
@@ -40,10 +43,7 @@ beforeEach(async () => {
   await pass(10);
 });
 
-afterEach(async () => {
-  pageLink.leave();
-  await pass(6_000);
-  setSites([]);
+afterEach(() => {
   vi.useRealTimers();
   vi.unstubAllGlobals();
 });
@@ -94,6 +94,78 @@ test("STOP ALL asks whether there are others, and stops at these too", async () 
   pageLink.now().live?.stop("all");
   await pass(10);
   expect(posted).toEqual([A, B, C].map(({ url }) => `${url}/api/stop`));
+});
+
+test("STOP ALL waits for no pause between two tries to hear of the runners", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  hear();
+  const answered = fetch;
+  let tries = 0;
+  let isSilent = true;
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (!url.endsWith("/api/config") || !isSilent) return answered(url, init);
+    tries += 1;
+    throw new TypeError("no answer");
+  });
+  while (tries < 6) await pass(100); // the next try comes five seconds later
+  isSilent = false;
+  runners = [A, B, C];
+  pageLink.now().live?.stop("all");
+  await pass(10);
+  expect(posted).toEqual([A, B, C].map(({ url }) => `${url}/api/stop`));
+});
+
+/** Let the runner at B answer nothing until it is let. Returns that, and the ids of the Stops that it hears. */
+function silence() {
+  const answered = fetch;
+  const heard: string[] = [];
+  let isSilent = true;
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (!url.startsWith(B.url)) return answered(url, init);
+    if (isSilent) throw new TypeError("no answer");
+    heard.push(JSON.parse(String(init.body)).stop_id);
+    return Response.json({ runs: [] });
+  });
+  const end = () => {
+    isSilent = false;
+  };
+  return { heard, end };
+}
+
+test("a STOP ALL that no runner has heard as the session ends is sent on, and shown until it is proven", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  hear();
+  const { heard, end } = silence();
+  pageLink.now().live?.stop("all");
+  const [stop] = pageLink.now().live?.state.stops ?? [];
+  await pass(100);
+  pageLink.leave();
+  await pass(5_000);
+  expect(pageLink.now()).toMatchObject({ signedIn: true });
+  expect(pageLink.now().live?.state.stops).toMatchObject([{ id: stop?.id, state: "unheard" }]);
+  end();
+  await pass(1_100);
+  expect(heard).toEqual([stop?.id]);
+  hear(); // the runner says what runs: nothing, so it is proven
+  expect(pageLink.now()).toMatchObject({ live: null, signedIn: false });
+});
+
+test("whoever signs in while a STOP ALL is not proven keeps it, and dials anew", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  hear();
+  silence();
+  pageLink.now().live?.stop("all");
+  pageLink.leave();
+  const before = Wire.all.length;
+  pageLink.enter("ada", 1);
+  expect(Wire.all.length - before).toBe(2);
+  await pass(100);
+  hear();
+  expect(pageLink.now().live?.state.stops).toMatchObject([{ state: "unheard" }]);
+  expect(pageLink.now().signedIn).toBe(true);
 });
 
 test("whoever comes back has the sockets of all again", async () => {

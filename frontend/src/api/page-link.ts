@@ -14,12 +14,15 @@ export interface PageLinkState {
   live: RunnerSockets | null;
   /** The address that stands for all runners, once the page can send them requests. */
   runner: string | undefined;
-  /** Set if a person is signed in, as far as this page knows: only then STOP is shown. */
+  /**
+   * Set if a person is signed in, as far as this page knows, or a STOP ALL of one who was is not proven: only
+   * then STOP is shown.
+   */
   signedIn: boolean;
 }
 
-const AGAIN = 5_000; // ms between two tries to hear where the runners are, at most
-const LOOK = 30_000; // ms after which a page that is looked at asks again: there may be others by now
+const LONGEST_PAUSE = 5_000; // ms between two tries to fetch where the runners are, at most
+const REFRESH = 30_000; // ms after which a page that is looked at fetches it again: there may be others by now
 
 class PageLink {
   #state: PageLinkState = { live: null, runner: undefined, signedIn: false };
@@ -28,11 +31,13 @@ class PageLink {
   #who = "";
   #visit = 0;
   #sites: readonly Site[] = [];
-  /** What is asked now, and whether it has to be asked once more. */
-  #asking: "no" | "yes" | "again" = "no";
-  #next: ReturnType<typeof setTimeout> | undefined;
+  /** Whether the sites are being fetched, and whether what is fetched is out of date already. */
+  #fetching: "no" | "yes" | "outdated" = "no";
+  #refreshTimer: ReturnType<typeof setTimeout> | undefined;
   /** Ends the pause between two tries. */
-  #goOn = () => {};
+  #endPause = () => {};
+  /** Ends waiting for the proof of a STOP ALL of somebody who has left. */
+  #endWait = () => {};
 
   now = (): PageLinkState => this.#state;
 
@@ -46,6 +51,7 @@ class PageLink {
    * name or visit dials anew, since the socket is known by the old one.
    */
   enter(who: string, visit: number): void {
+    this.#endWait();
     const known = this.#state.signedIn && this.#who === who && visit <= this.#visit;
     this.#who = who;
     this.#visit = Math.max(visit, this.#visit);
@@ -53,51 +59,62 @@ class PageLink {
       if (!known) this.#state.live.redial();
       return;
     }
-    const live = new RunnerSockets(this.look);
+    const live = new RunnerSockets(this.refreshSites);
     if (this.#sites.length > 0) live.setSites(this.#sites);
     this.#set({ live, signedIn: true });
-    this.look();
+    this.refreshSites();
   }
 
-  /** Says that nobody is signed in any more. */
+  /**
+   * Says that nobody is signed in any more. A STOP ALL that is not proven is sent and shown until it is: a
+   * session that has expired still stops.
+   */
   leave(): void {
-    if (!this.#state.signedIn) return;
-    this.#state.live?.close();
+    this.#endWait();
+    const { live } = this.#state;
+    if (live === null) return;
+    this.#who = "";
+    if (live.isStopping) {
+      this.#endWait = live.subscribe(() => live.isStopping || this.leave());
+      return;
+    }
+    live.close();
     this.#set({ live: null, signedIn: false });
   }
 
-  /** Asks where the runners are, until the editor has told it: without that there is no way for Stop. */
-  look = (): void => {
-    clearTimeout(this.#next);
-    if (this.#asking === "no") return void this.#ask();
-    this.#asking = "again";
-    this.#goOn();
+  /** Fetches where the runners are, until the editor has told it: without that there is no way for Stop. */
+  refreshSites = (): void => {
+    clearTimeout(this.#refreshTimer);
+    if (this.#fetching === "no") return void this.#fetchUntilFound();
+    this.#fetching = "outdated";
+    this.#endPause();
   };
 
-  async #ask(): Promise<void> {
-    for (let wait = 500; this.#state.signedIn; wait = Math.min(AGAIN, 2 * wait)) {
-      this.#asking = "yes";
+  async #fetchUntilFound(): Promise<void> {
+    for (let pause = 500; this.#state.signedIn; pause = Math.min(LONGEST_PAUSE, 2 * pause)) {
+      this.#fetching = "yes";
       try {
-        await this.#find();
-        if ((this.#asking as string) === "again") continue;
+        await this.#fetchSites();
+        if ((this.#fetching as string) === "outdated") continue;
         break;
       } catch (error) {
-        this.#state.live?.lose(errorText(error));
+        this.#state.live?.setLost(errorText(error));
       }
       await new Promise<void>((done) => {
-        this.#goOn = done;
-        setTimeout(done, wait);
+        this.#endPause = done;
+        setTimeout(done, pause);
       });
     }
-    this.#asking = "no";
-    if (this.#state.signedIn) this.#again();
+    this.#fetching = "no";
+    if (this.#state.signedIn) this.#refreshLater();
   }
 
-  #again(): void {
-    this.#next = setTimeout(() => (document.hidden ? this.#again() : this.look()), LOOK);
+  #refreshLater(): void {
+    const refresh = () => (document.hidden ? this.#refreshLater() : this.refreshSites());
+    this.#refreshTimer = setTimeout(refresh, REFRESH);
   }
 
-  async #find(): Promise<void> {
+  async #fetchSites(): Promise<void> {
     const { runner_url: url, runners } = await editor.get("/api/config", {}).catch((error) => {
       throw new Error(`The runner’s address is not known. ${errorText(error)}`);
     });
@@ -115,7 +132,7 @@ class PageLink {
           throw new Error(`${why} ${errorText(error)}`);
         },
       );
-      live.joinBy(joiner);
+      live.setJoiner(joiner);
     }
     if (this.#state.runner !== url) this.#set({ runner: url });
   }

@@ -63,7 +63,7 @@ afterEach(() => {
 
 test("STOP ALL reaches each site, and is proven there, though what joins them does not load", async () => {
   live.setSites([A, B]);
-  live.lose("A part of this page did not load.");
+  live.setLost("A part of this page did not load.");
   hello(A.url, run("a"));
   hello(B.url, run("b", { number: 2 }));
   expect(live.state.link).toBe("down"); // what runs is shown by nothing of this page
@@ -84,7 +84,7 @@ test("a Stop of the time in which nothing was joined is one with what comes late
   hello(A.url, run("a"));
   hello(B.url, run("b"));
   live.stop("all");
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   expect(live.state.link).toBe("live");
   expect(openRuns(live.state)).toHaveLength(2);
   expect(live.state.stops).toHaveLength(1);
@@ -104,7 +104,7 @@ test("a Stop before any runner is known is kept and said not to be sent, and goe
 
 test("a site that comes while the page is open is shown, and has what STOP ALL was about", async () => {
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   for (const { url } of [A, B]) hello(url);
   live.stop("all");
   live.setSites([A, B, C]);
@@ -122,7 +122,7 @@ test("a site that comes while the page is open is shown, and has what STOP ALL w
 
 test("a site that comes long after a Stop keeps what its people started", async () => {
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   live.stop("all");
   await vi.advanceTimersByTimeAsync(61_000);
   posted = [];
@@ -138,7 +138,7 @@ test("a second site makes of one runner two, and its socket stays", () => {
   live.setSites([A, B]);
   live.stop("all");
   expect(stopped()).toEqual([A.url, B.url]); // also before they are joined
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   expect(live.state.sites?.map(({ site }) => site.name)).toEqual(["Hall A", "Hall B"]);
   expect(openRuns(live.state).map(({ id }) => id)).toEqual(["a"]);
   expect(wiresOf(A.url)).toHaveLength(1);
@@ -146,7 +146,7 @@ test("a second site makes of one runner two, and its socket stays", () => {
 
 test("a site that has moved gets the Stops that nobody has answered, and no other", async () => {
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   for (const { url } of [A, B]) hello(url);
   hello(B.url, run("b"));
   wireOf(B.url).close(1006);
@@ -168,7 +168,7 @@ test("a site that has moved gets the Stops that nobody has answered, and no othe
 
 test("a site that is named no longer stays while something goes on there, and goes when it rests", () => {
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   hello(A.url);
   hello(B.url, run("b"));
   const names = () => live.state.sites?.map(({ site }) => site.name);
@@ -184,7 +184,7 @@ test("a site that is named no longer stays while something goes on there, and go
 });
 
 test("a site that has moved is stopped at its former address until the new one says what goes on", async () => {
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   live.setSites([A, B]);
   hello(A.url);
   hello(B.url, run("b"));
@@ -208,7 +208,7 @@ test("one runner that moves is stopped at both addresses, also where nothing joi
 });
 
 test("a Stop that is not proven stays in sight when its runner moves, or is named no longer", async () => {
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   live.setSites([A, B]);
   hello(A.url);
   hello(B.url, run("b"));
@@ -223,7 +223,7 @@ test("a Stop that is not proven stays in sight when its runner moves, or is name
 });
 
 test("of several runners that became one, Stop of a run goes to that one", () => {
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   live.setSites([A, B]);
   for (const { url } of [A, B]) hello(url);
   live.setSites([{ name: "", url: C.url }]);
@@ -233,7 +233,7 @@ test("of several runners that became one, Stop of a run goes to that one", () =>
 });
 
 test("nothing is started at a runner that is named no longer", async () => {
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   live.setSites([A, B]);
   hello(A.url);
   wireOf(B.url).say({ type: "hello", engines: [DORA], runs: [run("b")] });
@@ -247,7 +247,7 @@ test("nothing is started at a runner that is named no longer", async () => {
 
 test("a site that is named no longer and rests is gone, and one runner needs no name", async () => {
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   for (const { url } of [A, B]) hello(url);
   live.stop("all");
   await vi.advanceTimersByTimeAsync(100);
@@ -261,7 +261,7 @@ test("a site that is named no longer and rests is gone, and one runner needs no 
 
 test("a site whose clock is ahead makes nothing of the others older, and its own is as old as it is", async () => {
   live.setSites([A, B]);
-  live.joinBy(new SitesJoiner());
+  live.setJoiner(new SitesJoiner());
   for (const { url } of [A, B]) hello(url);
   const now = Date.UTC(2026, 10, 30, 10);
   const beat = (url: string, at: number, run: string) => {

@@ -16,6 +16,8 @@ import {
 import { type Site, setSites } from "./sites";
 
 export interface Part {
+  /** The name by which the editor lists the site, or did last. */
+  readonly listedAs: string;
   readonly site: Site;
   readonly socket: LiveSocket;
 }
@@ -27,9 +29,9 @@ export interface Joiner {
   join(parts: readonly Part[]): LiveState;
   joinTimes(parts: readonly Part[]): Times;
   /** Returns the sites that have a run or group; all while that is not known. */
-  having(run: string): readonly Part[];
+  partsWith(run: string): readonly Part[];
   /** Returns the site that has a run, if that is known. */
-  homeOf(run: string): Part | undefined;
+  partWith(run: string): Part | undefined;
 }
 
 const LATE = 60_000; // ms in which a site of which the page hears gets an earlier STOP ALL as well
@@ -43,13 +45,10 @@ export const NOTHING: LiveState = {
   stops: [],
 };
 
-const UNLISTED = " (no longer listed)";
-
-const nameOf = ({ site }: Part) => (site.isUnlisted ? site.name.replace(UNLISTED, "") : site.name);
-
-const unlisted = (part: Part): Part => ({
-  site: { ...part.site, name: `${nameOf(part)}${UNLISTED}`, isUnlisted: true },
-  socket: part.socket,
+const unlisted = ({ listedAs, site, socket }: Part): Part => ({
+  listedAs,
+  site: { ...site, name: `${listedAs} (no longer listed)`, isUnlisted: true },
+  socket,
 });
 
 /**
@@ -61,7 +60,7 @@ function isNeeded(part: Part, listed: readonly Part[]): boolean {
   if (state.stops.some((stop) => stop.state === "heard" && stop.provenAt === undefined))
     return true;
   const isMoved = listed.some(
-    ({ site, socket }) => site.name === nameOf(part) && socket.state.link === "live",
+    ({ listedAs, socket }) => listedAs === part.listedAs && socket.state.link === "live",
   );
   if (isMoved && state.link !== "live") return false;
   const goesOn = openRuns(state).length + foreignGraphs(state).length > 0;
@@ -94,7 +93,8 @@ export class RunnerSockets implements Times {
     const parts = sites.map((site, i): Part => {
       const known = old.find((part) => part.site.url === site.url);
       if (known?.site.name === site.name) return known;
-      return { site, socket: known?.socket ?? new LiveSocket(site.url, i === 0) };
+      const socket = known?.socket ?? new LiveSocket(site.url, i === 0);
+      return { listedAs: site.name, site, socket };
     });
     if (parts.length === old.length && parts.every((part, i) => part === old[i])) return;
     const left = old.filter(({ socket }) => !parts.some((part) => part.socket === socket));
@@ -102,10 +102,10 @@ export class RunnerSockets implements Times {
     this.#parts = [...parts, ...kept];
     setSites(this.#parts.length > 1 ? this.#parts.map(({ site }) => site) : []);
     const isFirst = old.length === 0;
-    for (const { site, socket } of parts) {
+    for (const { listedAs, socket } of parts) {
       if (old.some((part) => part.socket === socket)) continue;
       const late = this.#pressed.filter((stop) => isFirst || tick() - stop.at < LATE);
-      const moved = left.find((part) => nameOf(part) === site.name)?.socket.state.stops ?? [];
+      const moved = left.find((part) => part.listedAs === listedAs)?.socket.state.stops ?? [];
       const ids = new Map([...late, ...moved.filter(isWaiting)].map(({ id, run }) => [id, run]));
       tellEach(
         [...ids].map(
@@ -119,13 +119,13 @@ export class RunnerSockets implements Times {
       tellEach([() => socket.open()]);
     }
     for (const { socket } of left) if (!kept.some((part) => part.socket === socket)) socket.close();
-    this.lose("");
+    this.setLost("");
   }
 
   /** Takes what joins the states of several sites. */
-  joinBy(joiner: Joiner): void {
+  setJoiner(joiner: Joiner): void {
     this.#joiner = joiner;
-    this.lose("");
+    this.setLost("");
   }
 
   /** Whether there are several sockets, and nothing that joins what they know. */
@@ -133,10 +133,18 @@ export class RunnerSockets implements Times {
     return this.#parts.length > 1 && this.#joiner === undefined;
   }
 
-  /** Says why runners are not known, or not what goes on there. */
-  lose(why: string): void {
+  /** Takes the reason why runners are not known, or not what goes on there; "" if that is known. */
+  setLost(why: string): void {
     this.#lost = why;
     this.#hear();
+  }
+
+  /** Whether the last STOP ALL is not proven at some runner, or no runner is known yet. */
+  get isStopping(): boolean {
+    const last = this.#pressed.at(-1);
+    const isDue = ({ id, provenAt }: StopRequest) => id === last?.id && provenAt === undefined;
+    const isDueAt = ({ socket: { state } }: Part) => state.stops.some(isDue);
+    return last !== undefined && (this.#parts.length === 0 || this.#parts.some(isDueAt));
   }
 
   close(): void {
@@ -164,7 +172,7 @@ export class RunnerSockets implements Times {
   stop(run: string | "all"): void {
     const id = newAid();
     const isOfOne = run !== "all" && this.#parts.length > 1;
-    const having = isOfOne ? this.#joiner?.having(run) : undefined;
+    const having = isOfOne ? this.#joiner?.partsWith(run) : undefined;
     tellEach((having ?? this.#parts).map((part) => () => part.socket.stop(run, id)));
     if (run !== "all") return;
     const stop = { id, run, at: tick(), runs: [], state: "asked", detail: "" } as const;
@@ -175,7 +183,7 @@ export class RunnerSockets implements Times {
 
   learn(run: Parameters<LiveSocket["learn"]>[0]): void {
     const [part, ...others] = this.#parts;
-    const home = others.length === 0 ? part : this.#joiner?.homeOf(run.id);
+    const home = others.length === 0 ? part : this.#joiner?.partWith(run.id);
     home?.socket.learn(run); // of an unknown site it stays unknown to all
   }
 
