@@ -3,7 +3,9 @@ import { Button, Group, Select, Text, TextInput } from "@mantine/core";
 import { IconCheck, IconCode, IconCopy } from "@tabler/icons-react";
 import { type ReactNode, useState } from "react";
 import { errorText } from "../api/http";
+import { useMissingSites } from "../api/missing-sites";
 import { useLive } from "../api/page-link";
+import { siteOfId } from "../api/sites";
 import {
   useFrameOrigins,
   useMakeViewLink,
@@ -127,6 +129,9 @@ export function ViewLinks({ thing, origin }: Props) {
   const [days, setDays] = useState("7");
   const failed = [links, make, revoke].find(({ isError }) => isError)?.error;
   const open = links.data ?? [];
+  const missing = useMissingSites("get /api/view-links");
+  // The links of a run are at its site: only where that is not known all are asked.
+  const unsaid = thing.kind === "run" && siteOfId(thing.id) === undefined ? missing : [];
   return (
     <>
       <form
@@ -170,6 +175,11 @@ export function ViewLinks({ thing, origin }: Props) {
           {errorText(failed)}
         </p>
       )}
+      {unsaid.map(({ url, words }) => (
+        <p key={url} className="m-0 quiet-12" role="status">
+          {words}: links to this run may be missing here.
+        </p>
+      ))}
       {open.length > 0 && (
         <section className={style.links} aria-label={`Links to this ${thing.kind}`}>
           <h3 className="m-0 text-13 weight-650">{counted(open.length, "link")}</h3>

@@ -6,7 +6,7 @@ import { sessionEnd } from "./http";
 import { SitesJoiner } from "./live-sites";
 import { openRuns, silentRobots, stateOf, unheardRobots } from "./live-socket";
 import { RunnerSockets } from "./runner-sockets";
-import { noteSite } from "./site-knowledge";
+import { noteSite } from "./site-requests";
 import { setSites } from "./sites";
 
 const A = { name: "Hall A", url: "http://h:1" };

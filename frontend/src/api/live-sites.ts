@@ -5,8 +5,7 @@ import type { LiveState, SiteState, StopRequest } from "./live-socket";
 import type { Robot } from "./robots";
 import type { Joiner, Part } from "./runner-sockets";
 import type { Run } from "./runs";
-import { setKnowledge, siteOfId } from "./site-knowledge";
-import { siteRouter } from "./site-requests";
+import { setKnowledge, siteOfId, siteRouter } from "./site-requests";
 import { type Site, setSiteRouter } from "./sites";
 
 const STEADY = 250; // ms by which the clock of a site may differ from what is shown

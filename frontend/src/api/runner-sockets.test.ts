@@ -9,8 +9,8 @@ import { SitesJoiner } from "./live-sites";
 import { type LiveState, openRuns, silentSites } from "./live-socket";
 import { RunnerSockets } from "./runner-sockets";
 import type { Run } from "./runs";
-import { siteOfId } from "./site-knowledge";
 import { shiftOfRun } from "./site-places";
+import { siteOfId } from "./site-requests";
 import { allSites, setSites } from "./sites";
 
 const A = { name: "Hall A", url: "http://h:1" };

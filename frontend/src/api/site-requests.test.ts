@@ -3,8 +3,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { runnerAt } from "./client";
 import { listComparable } from "./review";
 import { registerRobot } from "./robots";
-import { setKnowledge } from "./site-knowledge";
-import { siteRouter } from "./site-requests";
+import { setKnowledge, siteRouter } from "./site-requests";
 import { newerFirst, type Site, setSiteRouter, setSites } from "./sites";
 import { unsaidSites } from "./unsaid-sites";
 

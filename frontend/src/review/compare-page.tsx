@@ -17,6 +17,7 @@ import { wayWords } from "../status/level-places";
 import { howWords, runEndText, useRunStatus, visitDuration } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
+import { useIsPhone } from "../ui/hooks";
 import { clock, day, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
@@ -33,7 +34,7 @@ import {
   valueDifferences,
 } from "./differences";
 import { GhostLanes } from "./ghost-lanes";
-import { type RunBarParts, useIsPhone } from "./run-page";
+import type { RunBarParts } from "./run-page";
 
 function Head({ run, title }: { run: Run; title: string }) {
   const by = useCurrentName(run.author);

@@ -5,6 +5,7 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
+import { useMissingSites } from "../api/missing-sites";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
 import {
@@ -17,7 +18,7 @@ import {
   removeEntry,
   useQueue,
 } from "../api/queue";
-import { SilentSites, useMissingSites } from "../status/silent-sites";
+import { SilentSites } from "../status/silent-sites";
 import { lineWords, valueLines } from "../status/value-words";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";

@@ -5,6 +5,7 @@ import { useMutation, useQueryClient } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
 import { errorText, unconfirmed } from "../api/http";
+import { useMissingSites } from "../api/missing-sites";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import {
@@ -22,7 +23,7 @@ import type { Run } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/progress";
 import { SecondPerson } from "../status/second-person";
-import { SilentSites, useMissingSites } from "../status/silent-sites";
+import { SilentSites } from "../status/silent-sites";
 import { StateLabel } from "../status/state-label";
 import { lineWords, valueLines } from "../status/value-words";
 import { useWatching, WatchTicks } from "../status/watching";

@@ -1,7 +1,6 @@
 /** One run: its version on the canvas, every visit on the timeline, what was said, how it ended. */
 
 import { Skeleton, Tabs } from "@mantine/core";
-import { useMediaQuery } from "@mantine/hooks";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { memo, type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
@@ -38,7 +37,7 @@ import { StateLabel } from "../status/state-label";
 import { WaitButton } from "../status/wait-button";
 import { withWaits } from "../status/waits";
 import { Empty } from "../ui/empty";
-import { useStableCallback } from "../ui/hooks";
+import { useIsPhone, useStableCallback } from "../ui/hooks";
 import { instant, useNow } from "../ui/times";
 import type { Crumb } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
@@ -56,11 +55,6 @@ import { noteSigns } from "./run-notes";
 import style from "./run-page.module.css";
 import { RunParameters } from "./run-parameters";
 import { RunPrint } from "./run-print";
-
-/** Return whether the actions of the page stand in a row below the bar, which has no room for them on a phone. */
-export function useIsPhone(): boolean {
-  return useMediaQuery("(max-width: 600px)", undefined, { getInitialValueInEffect: false });
-}
 
 export interface RunBarParts {
   crumbs: readonly Crumb[];
@@ -399,7 +393,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
     replay.seek(at);
     if (fact !== null) level.pick(fact);
   };
-  const isPhone = useIsPhone();
+  const isPhone = useIsPhone(); // the bar has no room for the actions of the page
   const actions = (
     <>
       <WaitButton run={newest} />

@@ -5,8 +5,7 @@ import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { afterEach, expect, test, vi } from "vitest";
 import { PersonContext } from "../api/people";
-import { setKnowledge } from "../api/site-knowledge";
-import { siteRouter } from "../api/site-requests";
+import { setKnowledge, siteRouter } from "../api/site-requests";
 import { setSiteRouter, setSites } from "../api/sites";
 import { standInForBrowser } from "../testing/browser";
 import "./robot-form"; // so that its part is there at once

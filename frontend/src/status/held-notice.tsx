@@ -27,7 +27,7 @@ import { actionWords, INTO, spokenIn } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
 import { movingRests } from "./rests";
 import { ServiceNotices } from "./robot-rights";
-import { useWatching, WatchTicks } from "./watching";
+import { movesWords, robotsOfRun, useWatching, WatchTicks } from "./watching";
 
 const AskedPeople = boundedPart(() => import("./asked-people").then((part) => part.AskedPeople), {
   waiting: null,
@@ -135,11 +135,8 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
   const end = until === "" ? "" : ` until ${actionWords(run, until)} is about to begin`;
   const obstacle = press.isPending ? "Asking …" : watch.obstacle;
   const disabled = obstacle !== null || now.link !== "live";
-  const robots = enginesOf(run).filter((engine) => engine !== SIMULATOR);
-  const players = robots.map(isolated).join(", ");
-  const isPress = robots.length === 0;
-  const moves =
-    players === "" ? "Only the simulator plays: nothing moves." : `${players} may begin to move.`;
+  const isPress = robotsOfRun(run).length === 0;
+  const moves = movesWords(run);
   return (
     <>
       <WatchTicks watch={watch} />

@@ -8,7 +8,6 @@ import { enginesOf } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import { letStep, setRunBreakpoints } from "../api/presses";
-import { SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
 import { runMarks } from "../graph/breakpoints";
 import type { Graph } from "../graph/model";
@@ -18,7 +17,7 @@ import { HoldButton } from "../ui/hold-button";
 import { isolated } from "../words/isolated";
 import { laterActions } from "./held-notice";
 import style from "./run-point.module.css";
-import { useWatching, WatchTicks } from "./watching";
+import { movesWords, robotsOfRun, useWatching, WatchTicks } from "./watching";
 
 interface Props {
   run: Run;
@@ -70,7 +69,7 @@ function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string;
   const obstacle = busy ? "Asking …" : watch.obstacle;
   const disabled = obstacle !== null || away;
   const moves = movesWords(run);
-  const isPress = robotsOf(run).length === 0;
+  const isPress = robotsOfRun(run).length === 0;
   return (
     <section className={style.point} aria-label={`${where} in run ${run.number}`}>
       <b>
@@ -121,15 +120,6 @@ function Steering({ run, graph, id, place }: Props & { graph: Graph; id: string;
       )}
     </section>
   );
-}
-
-const robotsOf = (run: Run) => enginesOf(run).filter((engine) => engine !== SIMULATOR);
-
-function movesWords(run: Run): string {
-  const robots = robotsOf(run);
-  return robots.length === 0
-    ? "Only the simulator plays: nothing moves."
-    : `${robots.map(isolated).join(", ")} may begin to move.`;
 }
 
 function failure(error: unknown, title: string) {

@@ -1,7 +1,10 @@
 /** Asks who watches the robots whose owners want to know it: one tick for each, before anything sets them going. */
 import { Checkbox } from "@mantine/core";
 import { useState } from "react";
+import { enginesOf } from "../api/led-runs";
 import { useLive } from "../api/page-link";
+import { SIMULATOR } from "../api/robots";
+import type { Run } from "../api/runs";
 import { isolated } from "../words/isolated";
 import style from "./watching.module.css";
 
@@ -38,6 +41,19 @@ export function useWatching(robots: readonly string[]): Watch {
       setSaid(said.includes(robot) ? said.filter((each) => each !== robot) : [...said, robot]),
     forget: () => setSaid([]),
   };
+}
+
+export const NOTHING_MOVES = "Only the simulator plays: nothing moves.";
+
+/** Return the robots that carry out a run. */
+export function robotsOfRun(run: Run): string[] {
+  return enginesOf(run).filter((engine) => engine !== SIMULATOR);
+}
+
+/** Return which of the robots of a run may begin to move, as a sentence. */
+export function movesWords(run: Run): string {
+  const players = robotsOfRun(run).map(isolated).join(", ");
+  return players === "" ? NOTHING_MOVES : `${players} may begin to move.`;
 }
 
 export function WatchTicks({ watch }: { watch: Watch }) {

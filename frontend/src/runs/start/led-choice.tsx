@@ -12,6 +12,7 @@ import { fromUmrf } from "../../canvas/from-umrf";
 import type { Action } from "../../graph/model";
 import { isReadyMade } from "../../graph/questions";
 import { robotCounts } from "../../graph/robots";
+import { NOTHING_MOVES } from "../../status/watching";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
 import style from "./led-choice.module.css";
@@ -110,7 +111,7 @@ export function castObstacle(actors: readonly string[], cast: Cast): string | nu
 export function movesWords(cast: Cast): string {
   const engines = [...new Set(Object.values(cast))].sort();
   const robots = engines.filter((name) => name !== SIMULATOR).map(isolated);
-  if (robots.length === 0) return "Only the simulator plays: nothing moves.";
+  if (robots.length === 0) return NOTHING_MOVES;
   const rest = engines.length > robots.length ? " The simulator plays the others." : "";
   const many = robots.length > 1 ? `${robots.slice(0, -1).join(", ")} and ` : "";
   return `${many}${robots.at(-1)} may begin to move at any time until the run ends.${rest}`;
