@@ -186,8 +186,12 @@ async def _chores(services: EditorServices) -> AsyncIterator[None]:
             yield
         return
     from action_assistant.editor.cluster.others_changes import OthersChanges
+    from action_assistant.editor.rooms.others_people import OthersPeople
 
-    changes = OthersChanges(services.journal, services.refresh_people, services.rights.refresh)
+    people = OthersPeople(services.journal, services.rooms)
+    changes = OthersChanges(
+        services.journal, services.refresh_people, services.rights.refresh, people.exchange
+    )
     async with changes.taken_up(), done_by_one(services.owners, doing):
         yield
 

@@ -258,7 +258,7 @@ editor: Final = Table(
     Column("proof", LargeBinary),
 )
 #: The editor that owns a stream, by its life, since it took the stream with this epoch. It only shows where to
-#: ask; `head.epoch` says who may append.
+#: ask; `head.epoch` says who may append. `people`: JSON of who is in the room, null for nobody.
 room: Final = Table(
     "room",
     EDITOR,
@@ -266,5 +266,6 @@ room: Final = Table(
     Column("life", LargeBinary, nullable=False),
     Column("epoch", BigInteger, nullable=False),
     Column("since", BigInteger, nullable=False),
+    Column("people", Text),
     Index(None, "life"),
 )

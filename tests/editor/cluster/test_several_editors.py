@@ -154,6 +154,39 @@ def test_an_action_of_the_library_is_changed_in_graphs_that_other_editors_have_o
         assert asked(each, "GET", f"/api/graphs/{graph}/history")
 
 
+async def test_every_editor_lists_who_is_in_a_graph_wherever_it_is_open(
+    editors: list[OneOfSeveral],
+) -> None:
+    graph = asked(editors[0], "POST", "/api/graphs", json={"name": "crowded"})["id"]
+
+    def listed(**wanted: Any) -> list[list[str]]:
+        """Return the names of the people whom each list shows in the graph."""
+        return [
+            [person["name"] for person in each.get("people", ())]
+            for editor in editors
+            for each in asked(editor, "GET", "/api/graphs", params=wanted)
+            if each["id"] == graph
+        ]
+
+    def found() -> int:
+        """Return how many editors find the graph by the name of somebody who is in it."""
+        return len(listed(q="kadri", limit=5))
+
+    link = asked(editors[2], "POST", "/api/members", json={"name": "Kadri", "role": "viewer"})
+    await until(lambda: "Kadri" in str(asked(editors[1], "GET", "/api/members")))
+    assert (listed(), found()) == ([[], [], []], 0)
+    async with httpx.AsyncClient(base_url=editors[1].url, trust_env=False) as browser:
+        proof = {"invitation": link["links"][0]["path"].partition("=")[2]}
+        origin = {"origin": editors[1].url}
+        assert (await browser.post("/api/session", json=proof, headers=origin)).is_success
+        cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
+        async with editors[1].socket(graph, cookie=cookie, **origin) as socket:
+            await socket.send_bytes(bytes([1, 6, 1, 7, 1, 2]) + b"{}")  # presence: client 7, {}
+            await until(lambda: listed() == [["Kadri"], ["Kadri"], ["Kadri"]])
+            assert found() == 3
+    await until(lambda: listed() == [[], [], []])
+
+
 async def test_asking_for_graphs_that_do_not_exist_leaves_nothing(
     editors: list[OneOfSeveral], postgres: Server
 ) -> None:

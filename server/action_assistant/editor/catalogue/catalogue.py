@@ -378,7 +378,6 @@ class Catalogue:
 
     def _shown(self, row: Row[Any], summary: GraphSummary) -> GraphView:
         name, description = _called(row, summary)
-        room = self._rooms.open_room(h.graph_stream(row.id))
         told = summary.told
         return GraphView(
             id=row.id,
@@ -393,7 +392,7 @@ class Catalogue:
             to_fill_in=None if told is None else told.to_fill_in,
             robots=summary.robots,
             labels=summary.labels,
-            people=() if room is None else room.presence.people(),
+            people=self._rooms.people_in(h.graph_stream(row.id)),
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
             damaged=summary.damaged,
             kind=row.kind,

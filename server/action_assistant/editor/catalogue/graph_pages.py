@@ -214,11 +214,12 @@ class GraphPages:
 
     def _says(self, word: str) -> ColumnElement[bool]:
         """Return the condition that a graph, or somebody who is in it now, is called by a word."""
+        present = {**self._rooms.people_elsewhere, **self._rooms.people_here()}
         visited = [
             found
-            for room in self._rooms.open_rooms()
-            if (found := graph_of(room.stream)) is not None
-            and any(word in person.name.lower() for person in room.presence.people())
+            for stream, people in present.items()
+            if (found := graph_of(stream)) is not None
+            and any(word in person.name.lower() for person in people)
         ]
         says = facts.c.words.contains(word, autoescape=True)
         return or_(says, graph.c.id.in_(visited)) if visited else says

@@ -26,12 +26,13 @@ _OF_RULES: Final = (h.RULED, h.FILED)
 
 class OthersChanges:
     """Polls the log twice a second for changes by other editors. Calls `people` after changes of persons
-    and links, `rules` after changes of folders and rules."""
+    and links, `rules` after changes of folders and rules, and then `also`, whatever has changed."""
 
-    def __init__(self, journal: Journal, people: Refresh, rules: Refresh) -> None:
+    def __init__(self, journal: Journal, people: Refresh, rules: Refresh, also: Refresh) -> None:
         self._journal = journal
         # Rules come first: people wait for changes of persons that are being stored.
         self._refreshes = {"rules": rules, "people": people}
+        self._also = also
         self._due = set(self._refreshes)  # what was read before the cursor began
         self._seen = Cursor()
 
@@ -48,6 +49,7 @@ class OthersChanges:
         while True:
             try:
                 await self.look()
+                await self._also()
             except Refused as error:  # where nothing can be read, nothing can be changed, either
                 log.warning("changes of other editors are not read: %s", error.detail)
             # A fault of this program must not end the loop: the copies would stay old for good.

@@ -59,7 +59,7 @@ _RAISE: Final = text("UPDATE head SET epoch = epoch + 1 WHERE stream = :stream R
 _SHOW: Final = text(
     f"INSERT INTO room AS r (stream, life, epoch, since) VALUES (:stream, :life, :epoch, {_NOW})"
     " ON CONFLICT (stream) DO UPDATE"
-    " SET life = excluded.life, epoch = excluded.epoch, since = excluded.since"
+    " SET life = excluded.life, epoch = excluded.epoch, since = excluded.since, people = NULL"
     " WHERE (r.life, r.epoch) = (CAST(:old_life AS bytea), CAST(:old_epoch AS bigint))"
     " RETURNING stream"
 )

@@ -1,7 +1,7 @@
 """The rooms that are open. Each is loaded once, kept while somebody uses it, and unloaded some seconds later."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from typing import TYPE_CHECKING, Final
 
@@ -15,6 +15,7 @@ from action_assistant.errors import NotFound, Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.caller import outlive_connection
 from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 if TYPE_CHECKING:  # slow to load, and one editor alone does without
@@ -65,6 +66,8 @@ class Rooms:
         self._taken: set[str] = set()
         self._closed = self._draining = False
         self._divergences = 0
+        #: The people in rooms of other editors, by stream, as of half a second ago.
+        self.people_elsewhere: Mapping[str, tuple[PersonRef, ...]] = {}
         self.metrics: Final = RoomMetrics()
         self._heartbeat = asyncio.create_task(self._send_heartbeats(), name="heartbeat")
 
@@ -122,6 +125,15 @@ class Rooms:
     def open_rooms(self) -> list[Room]:
         """Return all rooms that are open now."""
         return list(self._rooms.values())
+
+    def people_here(self) -> dict[str, tuple[PersonRef, ...]]:
+        """Return who is in the rooms of this editor, by stream."""
+        return {room.stream: room.presence.people() for room in self.open_rooms()}
+
+    def people_in(self, stream: str) -> tuple[PersonRef, ...]:
+        """Return who is in the graph of a stream now, at whichever editor it is open."""
+        room = self._rooms.get(stream)
+        return self.people_elsewhere.get(stream, ()) if room is None else room.presence.people()
 
     @property
     def divergences(self) -> int:
