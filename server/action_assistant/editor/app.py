@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -38,7 +38,7 @@ from action_assistant.editor.api import (
 )
 from action_assistant.editor.api.graph_guard import guarded
 from action_assistant.editor.cluster.chores import CHORES, done_by_one
-from action_assistant.editor.cluster.owners import Alone, Here, Owners
+from action_assistant.editor.cluster.owners import Alone, Here, Owner, Owners
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people import audit_facts
@@ -58,8 +58,10 @@ from action_assistant.web.audit.routes import audit_routes, keeping_routes
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
+from action_assistant.web.auth.desk import Desk
 from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, ScrapeToken, Session
+from action_assistant.web.auth.login_codes import LoginCodes
 from action_assistant.web.auth.passkeys import PasskeyFiles, Passkeys
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.provider_settings import provider_of
@@ -224,7 +226,8 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
     browsers.every()  # forgets those that are over
     token_files = TokenFiles(settings.data, keys, revoked, most_days=settings.token_days)
     view_links = ViewLinks(settings.data, keys, revoked, "graph")
-    codes = DeviceCodes(limits=settings.limits)
+    desk = _desk(app_state, settings, keys)
+    codes = desk.hold(DeviceCodes(limits=settings.limits))
     addresses = _addresses(settings)
     public = settings.reached.public
     page = public.page if public is not None else ""
@@ -267,6 +270,7 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
         browsers,
         confirmations,
         audit,
+        desk.hold(provider.AnsweredStates()),
     )
     made = application(
         [
@@ -276,8 +280,8 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
             *notification_routes(lambda: app_state.services.notifications, audit.receiver_tested),
             *devices.routes(codes, browsers, addresses, audit, keys),
             *confirmation_routes(confirmations, limits=settings.limits),
-            *passkeys.routes(Passkeys(passkey_files), confirmations, audit),
-            *tokens.routes(app_state, token_files, limits=settings.limits),
+            *passkeys.routes(desk.hold(Passkeys(passkey_files), slow=True), confirmations, audit),
+            *tokens.routes(app_state, token_files, desk.hold(LoginCodes()), limits=settings.limits),
             *view.routes(app_state, view_links, addresses, audit, settings.frames),
             *doctor.routes(settings),
         ],
@@ -302,7 +306,7 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
         relay=None if settings.cluster is None else partial(_relaying, app_state),
     )
     if settings.cluster is not None:
-        made.entrance = _entrance(app_state, made, keys, settings.cluster.url)
+        made.entrance = _entrance(app_state, made, keys, settings.cluster.url, desk)
         made.drain = lambda: app_state.services.rooms.drain()
     return made
 
@@ -311,21 +315,38 @@ def _relaying(app_state: EditorState, app: ASGIApp) -> ASGIApp:
     """Return an application that relays what is of graphs of other editors, and passes the rest to `app`."""
     from action_assistant.editor.cluster.relay import Relay  # slow to load
 
-    def peers() -> "Peers":
-        found = app_state.services.peers
-        if found is None:
-            raise RuntimeError("this editor is the only one")
-        return found
+    def owned(stream: str) -> AbstractAsyncContextManager[Owner]:
+        return app_state.services.rooms.owned(stream)
 
-    return Relay(app, lambda stream: app_state.services.rooms.owned(stream), peers)
+    return Relay(app, owned, lambda: _peers(app_state))
 
 
-def _entrance(app_state: EditorState, made: Application, keys: Keys, url: str) -> ASGIApp:
+def _peers(app_state: EditorState) -> "Peers":
+    found = app_state.services.peers
+    if found is None:
+        raise RuntimeError("this editor is the only one")
+    return found
+
+
+def _desk(app_state: EditorState, settings: EditorSettings, keys: Keys) -> Desk:
+    if settings.cluster is None:
+        return Desk()
+    from action_assistant.editor.cluster.shared_desk import SharedDesk  # slow to load
+
+    return SharedDesk(lambda: app_state.services.owners, lambda: _peers(app_state), keys.relay_key)
+
+
+def _entrance(
+    app_state: EditorState, made: Application, keys: Keys, url: str, desk: Desk
+) -> ASGIApp:
     from action_assistant.editor.api.entrance import Entrance  # slow to load
     from action_assistant.editor.cluster.relay_seal import RelaySeal
+    from action_assistant.editor.cluster.shared_desk import SharedDesk
 
+    if not isinstance(desk, SharedDesk):
+        raise TypeError("nobody else asks the only editor")
     seal = RelaySeal(keys.relay_key)
-    return Entrance(made.access.relayed, url, seal, lambda: app_state.services.rooms)
+    return Entrance(made.access.relayed, url, seal, lambda: app_state.services.rooms, desk)
 
 
 def _addresses(settings: EditorSettings) -> Addresses:

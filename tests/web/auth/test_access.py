@@ -19,6 +19,7 @@ from websockets.sync.client import connect
 
 from action_assistant.errors import Unauthenticated
 from action_assistant.web.auth.access import Needs, SignedIn, person_of
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, Person, PersonRef, Session
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
@@ -94,7 +95,7 @@ def served(folder: Path) -> Iterator[int]:
         Sessions(KEYS, port, Nobody, revoked, standings),
         revoked=revoked,
         standings=standings,
-        codes=DeviceCodes(),
+        codes=Held(DeviceCodes()),
     )
     app = application(
         [me, stop, start, broken, live, *sessions],

@@ -71,7 +71,7 @@ def test_no_order_of_steps_signs_a_device_in_that_was_not_confirmed(steps: list[
                     if codes.confirmed(claim) is not None:
                         assert claim == confirmed
                         assert claim not in collected
-                        codes.collected(claim)
+                        codes.collect(claim)
                         collected.add(claim)
         except (NotFound, Conflict, Unauthenticated):
             pass

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 from action_assistant.errors import Conflict, NotFound, Refused, TooMany, Unavailable
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person
-from action_assistant.web.auth.login_codes import Claimed, Confirmed, LoginCodes
+from action_assistant.web.auth.login_codes import Claimed, Confirmed, LoginCodes, claim
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.tokens import MadeToken, TokenFiles
 
@@ -41,7 +42,7 @@ async def fetched(codes: LoginCodes, secret: str, tokens: TokenFiles) -> Claimed
         await asyncio.sleep(0)
         return tokens.make(said.by, said.name, said.scopes, said.days)
 
-    return await codes.claim(secret, make)
+    return await claim(Held(codes), secret, make)
 
 
 @pytest.fixture
@@ -111,7 +112,7 @@ def test_a_full_disk_loses_no_confirmed_login(tokens: TokenFiles) -> None:
         begun = codes.begin("cli", ("read",), None, "")
         codes.confirm(begun.code, word())
         with pytest.raises(Unavailable):
-            await codes.claim(begun.secret, full)
+            await claim(Held(codes), begun.secret, full)
         assert (await fetched(codes, begun.secret, tokens)).state == "granted"
 
     asyncio.run(played())
@@ -125,17 +126,17 @@ def test_who_asks_too_often_waits_longer() -> None:
         clock = Clock()
         codes = LoginCodes(clock)
         secret = codes.begin("cli", ("read",), None, "").secret
-        assert (await codes.claim(secret, never)).state == "waiting"
+        assert (await claim(Held(codes), secret, never)).state == "waiting"
         waits = []
         for _ in range(20):
-            said = await codes.claim(secret, never)
+            said = await claim(Held(codes), secret, never)
             assert said.state == "slower"
             waits.append(said.interval)
         assert waits == sorted(waits)
         assert waits[0] == 4
         assert waits[-1] == 30
         clock.now += 30
-        assert (await codes.claim(secret, never)).state == "waiting"
+        assert (await claim(Held(codes), secret, never)).state == "waiting"
 
     asyncio.run(played())
 
@@ -255,7 +256,7 @@ class AnyOrder(RuleBasedStateMachine):
 
         async def at_once() -> None:
             await asyncio.gather(
-                *(self.codes.claim(self.logins[which][1], make) for _ in range(times))
+                *(claim(Held(self.codes), self.logins[which][1], make) for _ in range(times))
             )
 
         before = len(self.made)

@@ -12,6 +12,7 @@ from action_assistant.errors import BadInput, NotFound
 from action_assistant.web.audit.events import SessionEnded
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import Needs, PersonOnly, live_session
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.device_codes import DeviceAsking, DeviceCode, DeviceCodes
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.session_files import OpenSession, SessionFiles
@@ -39,7 +40,7 @@ class DeviceIsMine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(
-    codes: DeviceCodes,
+    codes: Held[DeviceCodes],
     browsers: SessionFiles,
     addresses: Addresses,
     audit: AuditLog,
@@ -104,7 +105,7 @@ def _own(
 
 
 def _adding(
-    codes: DeviceCodes, browsers: SessionFiles, addresses: Addresses
+    codes: Held[DeviceCodes], browsers: SessionFiles, addresses: Addresses
 ) -> list[ControllerRouterHandler]:
     @post(
         "/api/devices/codes",
@@ -117,7 +118,7 @@ def _adding(
     async def make(request: _Asking) -> DeviceCode:
         session = live_session(request)
         await to_thread.run_sync(browsers.require_room, session.person.id)
-        return codes.open(session)
+        return await codes.call(DeviceCodes.open, session)
 
     @get(
         "/api/devices/codes/{code:str}",
@@ -126,7 +127,7 @@ def _adding(
         guards=[PersonOnly(), Needs("see")],
     )
     async def look(code: str, request: _Asking) -> DeviceAsking:
-        return codes.look(code, live_session(request))
+        return await codes.call(DeviceCodes.look, code, live_session(request))
 
     @post(
         "/api/devices/codes/{code:str}/answer",
@@ -136,7 +137,8 @@ def _adding(
         guards=[PersonOnly(), Needs("see")],
     )
     async def say(code: str, data: DeviceIsMine, request: _Asking) -> None:
-        codes.answer(code, live_session(request), is_mine=data.yes)
+        session = live_session(request)
+        await codes.call(DeviceCodes.answer, code, session, is_mine=data.yes)
 
     @delete(
         "/api/devices/codes/{code:str}",
@@ -146,7 +148,7 @@ def _adding(
         guards=[PersonOnly(), Needs("see")],
     )
     async def cancel(code: str, request: _Asking) -> None:
-        codes.cancel(code, live_session(request))
+        await codes.call(DeviceCodes.cancel, code, live_session(request))
 
     @get(
         "/api/devices/codes/{code:str}/qr",
@@ -158,6 +160,7 @@ def _adding(
     async def picture(code: str, origin: str, request: _Asking) -> Response[bytes]:
         if not addresses.is_page(origin):
             raise BadInput("The page is not to be found there.", where={"path": "/origin"})
-        return qr_code(f"{origin}/#d={codes.text(code, live_session(request))}")
+        text = await codes.call(DeviceCodes.text, code, live_session(request))
+        return qr_code(f"{origin}/#d={text}")
 
     return [make, look, say, cancel, picture]

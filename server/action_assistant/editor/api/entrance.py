@@ -20,6 +20,7 @@ from action_assistant.editor.cluster.relay_seal import (
     RelayedFacts,
     RelaySeal,
 )
+from action_assistant.editor.cluster.shared_desk import CALLS, SIGN_IN, SharedDesk
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.remote_room import AUTHOR, EXPECTED, ROOMS, SEQ, SubmittedSeq
 from action_assistant.errors import NotFound, Refused, Unauthenticated, Unavailable
@@ -49,12 +50,18 @@ class Entrance:
     find it."""
 
     def __init__(
-        self, app: Admitted, url: str, seal: RelaySeal, rooms: Callable[[], Rooms]
+        self,
+        app: Admitted,
+        url: str,
+        seal: RelaySeal,
+        rooms: Callable[[], Rooms],
+        desk: SharedDesk,
     ) -> None:
         self._app = app
         self._url = url
         self._seal = seal
         self._rooms = rooms
+        self._desk = desk
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request of another editor. The parameters are those of ASGI."""
@@ -62,17 +69,20 @@ class Entrance:
             return
         call: Any = scope
         try:
-            facts, body = await self._verified(call, receive)
+            try:
+                facts, body = await self._verified(call, receive)
+                if facts.identity is None and not facts.is_inner:
+                    raise Unauthenticated("Nobody is named for whom this is.")
+            except Unauthenticated as refused:
+                await refuse(call, receive, send, refused, challenge=SCHEME)
+                return
             path = call["path"].removeprefix(PREFIX)
-            is_of_room = path.startswith(ROOMS)
-            stream = path.removeprefix(ROOMS) if is_of_room else stream_of(path)
-            if stream is None or is_of_room != facts.is_inner:
+            stream = _inner_stream(path) if facts.is_inner else stream_of(path)
+            if stream is None:
                 raise NotFound(f"Nothing is relayed to {path}.")
             begin({"request": facts.request})
             if not await self._answered(stream, call, receive, send, facts, body):
                 await _misdirect(call, receive, send)
-        except Unauthenticated as refused:
-            await refuse(call, receive, send, refused, challenge=SCHEME)
         except Refused as refused:
             await refuse(call, receive, send, refused)
 
@@ -93,11 +103,12 @@ class Entrance:
                 return False
             if isinstance(owner, Elsewhere):
                 return False
-            if facts.is_inner:
+            if stream == SIGN_IN:
+                path = scope["path"].removeprefix(PREFIX)
+                await answer(send, 200, [], await self._desk.answer(path, body))
+            elif facts.is_inner:
                 await self._room(stream, scope, send, facts, body)
-            elif facts.identity is None:
-                raise Unauthenticated("Nobody is named for whom this is.")
-            else:
+            elif facts.identity is not None:
                 prefix = len(PREFIX)
                 inner: Any = {
                     **scope,
@@ -143,6 +154,13 @@ class Entrance:
         if hashlib.sha256(body).hexdigest() != headers[DIGEST]:
             raise Unauthenticated("This is not the body that an editor has sealed.")
         return facts, body
+
+
+def _inner_stream(path: str) -> str | None:
+    """Return the stream to whose owner a request of an editor itself belongs; None for unknown paths."""
+    if path.startswith(CALLS):
+        return SIGN_IN
+    return path.removeprefix(ROOMS) if path.startswith(ROOMS) else None
 
 
 async def _misdirect(scope: Any, receive: Receive, send: Send) -> None:

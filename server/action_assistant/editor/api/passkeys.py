@@ -13,6 +13,7 @@ from action_assistant.web.audit.events import Confirmed, PasskeyChanged
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import Needs, PersonOnly, identity_of, live_session
 from action_assistant.web.auth.confirmations import LONGEST_S, Confirmation, Confirmations
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.passkeys import Passkey, Passkeys
 
 _BODY: Final = 20_000  # bytes
@@ -72,13 +73,13 @@ class OwnerAsked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(
-    passkeys: Passkeys, confirmations: Confirmations, audit: AuditLog
+    passkeys: Held[Passkeys], confirmations: Confirmations, audit: AuditLog
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/passkeys`. They are for browsers: a token has no passkeys."""
     return [*_own(passkeys, audit), *_confirming(passkeys, confirmations, audit)]
 
 
-def _own(passkeys: Passkeys, audit: AuditLog) -> list[ControllerRouterHandler]:
+def _own(passkeys: Held[Passkeys], audit: AuditLog) -> list[ControllerRouterHandler]:
     def note(request: _Asking, passkey: Passkey, what: Literal["registered", "removed"]) -> None:
         changed = PasskeyChanged(passkey.id, passkey.name, what)
         audit.note(changed, identity_of(request).person.id)
@@ -91,7 +92,7 @@ def _own(passkeys: Passkeys, audit: AuditLog) -> list[ControllerRouterHandler]:
     )
     async def list_passkeys(request: _Asking) -> OwnPasskeys:
         person = live_session(request).person.id
-        file = await to_thread.run_sync(passkeys.files.of, person)
+        file = await to_thread.run_sync(passkeys.store.files.of, person)
         return OwnPasskeys([_shown(each) for each in file.passkeys], file.ask_again)
 
     @post(
@@ -103,9 +104,7 @@ def _own(passkeys: Passkeys, audit: AuditLog) -> list[ControllerRouterHandler]:
     async def begin(request: _Asking) -> PasskeyOptions:
         session, by = live_session(request), identity_of(request)
         origin = request.headers.get("origin", "")
-        return PasskeyOptions(
-            await to_thread.run_sync(passkeys.begin_registration, by, session, origin)
-        )
+        return PasskeyOptions(await passkeys.call(Passkeys.begin_registration, by, session, origin))
 
     @post(
         "/api/passkeys",
@@ -116,7 +115,7 @@ def _own(passkeys: Passkeys, audit: AuditLog) -> list[ControllerRouterHandler]:
     )
     async def register(data: JSONBody[NewPasskey], request: _Asking) -> PasskeyShown:
         session, by = live_session(request), identity_of(request)
-        made = await to_thread.run_sync(passkeys.register, by, session, data.name, data.credential)
+        made = await passkeys.call(Passkeys.register, by, session, data.name, data.credential)
         note(request, made, "registered")
         return _shown(made)
 
@@ -130,7 +129,7 @@ def _own(passkeys: Passkeys, audit: AuditLog) -> list[ControllerRouterHandler]:
         passkey: FromPath[str], data: JSONBody[PasskeyName], request: _Asking
     ) -> PasskeyShown:
         person = live_session(request).person.id
-        return _shown(await to_thread.run_sync(passkeys.rename, person, passkey, data.name))
+        return _shown(await passkeys.call(Passkeys.rename, person, passkey, data.name))
 
     @delete(
         "/api/passkeys/{passkey:str}",
@@ -141,13 +140,13 @@ def _own(passkeys: Passkeys, audit: AuditLog) -> list[ControllerRouterHandler]:
     )
     async def remove(passkey: FromPath[str], request: _Asking) -> None:
         person = live_session(request).person.id
-        note(request, await to_thread.run_sync(passkeys.remove, person, passkey), "removed")
+        note(request, await passkeys.call(Passkeys.remove, person, passkey), "removed")
 
     return [list_passkeys, begin, register, rename, remove]
 
 
 def _confirming(
-    passkeys: Passkeys, confirmations: Confirmations, audit: AuditLog
+    passkeys: Held[Passkeys], confirmations: Confirmations, audit: AuditLog
 ) -> list[ControllerRouterHandler]:
     @post(
         "/api/passkeys/confirm/challenge",
@@ -158,9 +157,7 @@ def _confirming(
     async def begin(request: _Asking) -> PasskeyOptions:
         session, by = live_session(request), identity_of(request)
         origin = request.headers.get("origin", "")
-        return PasskeyOptions(
-            await to_thread.run_sync(passkeys.begin_confirmation, by, session, origin)
-        )
+        return PasskeyOptions(await passkeys.call(Passkeys.begin_confirmation, by, session, origin))
 
     @post(
         "/api/passkeys/confirm",
@@ -174,7 +171,7 @@ def _confirming(
     )
     async def confirm(data: JSONBody[PasskeyProof], request: _Asking) -> Confirmation:
         session, by = live_session(request), identity_of(request)
-        await to_thread.run_sync(passkeys.verify, by, session, data.credential)
+        await passkeys.call(Passkeys.verify, by, session, data.credential)
         made = await to_thread.run_sync(confirmations.confirm, session.id, "passkey")
         audit.note(Confirmed(session.id, "passkey"), by.person.id)
         return made
@@ -189,7 +186,7 @@ def _confirming(
     async def ask_again(data: JSONBody[OwnerAsked], request: _Asking) -> None:
         by = identity_of(request)
         live_session(request)
-        await to_thread.run_sync(passkeys.set_ask_again, by, data.ask_again)
+        await passkeys.call(Passkeys.set_ask_again, by, data.ask_again)
         audit.note(PasskeyChanged("", str(data.ask_again), "asked"), by.person.id)
 
     return [begin, confirm, ask_again]

@@ -43,6 +43,7 @@ from action_assistant.web.auth.access import (
 )
 from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.auth.confirmations import Confirmations
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.keys import Keys, Session
 from action_assistant.web.auth.people_files import NAME_LIMIT
 from action_assistant.web.auth.session_files import SessionFiles
@@ -118,6 +119,22 @@ class _UnderWay(Question, frozen=True):
     session: str = ""
 
 
+class AnsweredStates:
+    """The sign-ins that were answered, by their states, for as long as they could be answered."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._until: dict[str, float] = {}
+
+    def add(self, state: str) -> bool:
+        """Note that a sign-in is answered, and return whether it was not before."""
+        now = self._clock()
+        self._until = {each: until for each, until in self._until.items() if until > now}
+        is_first = state not in self._until
+        self._until.setdefault(state, now + _LIFE_S)
+        return is_first
+
+
 class ProviderSignIn:
     """Begins sign-ins, and takes their answers, each once."""
 
@@ -132,7 +149,7 @@ class ProviderSignIn:
         browsers: SessionFiles,
         confirmations: Confirmations,
         audit: AuditLog,
-        clock: Callable[[], float] = time.time,
+        answers: "Held[AnsweredStates]",
     ) -> None:
         self._provider = provider
         self._app_state = app_state
@@ -144,8 +161,8 @@ class ProviderSignIn:
         self._browsers = browsers
         self._confirmations = confirmations
         self._audit = audit
-        self._clock = clock
-        self._answered: dict[str, float] = {}  # states, until when they are kept
+        self._clock = time.time
+        self._answers = answers
 
     def offer(self, request: _Asking) -> ProviderOffer:
         """Return the provider that is offered at the address that the person came to."""
@@ -190,7 +207,12 @@ class ProviderSignIn:
         Unauthenticated, Withdrawn, Forbidden, Conflict or Unavailable, each with the reason."""
         self._sessions.admit(request)
         provider, _ = self._offered(request)
-        under_way = self._taken(data.state, request, provider)
+        under_way = self._begun(data.state, request, provider)
+        if under_way is None or not await self._answers.call(AnsweredStates.add, data.state):
+            raise Unauthenticated(
+                "Nobody was signed in: this sign-in was not begun in this browser, was answered already, "
+                "or is older than 10 minutes. Begin again."
+            )
         await provider.check_sender(data.iss)
         if data.code is None:
             why = one_line((data.error_description or data.error or "nothing")[:200])
@@ -231,12 +253,9 @@ class ProviderSignIn:
         page = public.page if public is not None else self._addresses.direct(host, self._port)
         return page if page.startswith("https:") or host_name(host) in LOOPBACK else None
 
-    def _taken(self, state: str, request: _Asking, provider: IdentityProvider) -> _UnderWay:
-        """Return the sign-in of an answer, which is answered herewith. Raise Unauthenticated if this
-        browser did not begin it, or it is too old or was answered before."""
+    def _begun(self, state: str, request: _Asking, provider: IdentityProvider) -> _UnderWay | None:
+        """Return the sign-in of an answer; None if this browser did not begin it, or it is too old."""
         now = self._clock()
-        for old in [each for each, until in self._answered.items() if until <= now]:
-            del self._answered[old]
         name = self._cookie + state.partition(".")[0]
         for value in cookie_values(request.headers.get("cookie", ""), name):
             found = _opened(self._keys.question(value))
@@ -246,14 +265,9 @@ class ProviderSignIn:
                 and found.issuer == provider.settings.issuer
                 and found.client_id == provider.settings.client_id
                 and 0 <= now - found.begun < _LIFE_S
-                and state not in self._answered
             ):
-                self._answered[state] = now + _LIFE_S
                 return found
-        raise Unauthenticated(
-            "Nobody was signed in: this sign-in was not begun in this browser, was answered already, "
-            "or is older than 10 minutes. Begin again."
-        )
+        return None
 
     async def _come(
         self, found: ProviderIdentity, request: _Asking, provider: IdentityProvider

@@ -14,6 +14,7 @@ from action_assistant.errors import BadInput, TooMany
 from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.web.auth.access import Needs, Open, PersonOnly, client_address, identity_of
 from action_assistant.web.auth.caller import client_network
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.identity import Scope
 from action_assistant.web.auth.login_codes import (
     Claimed,
@@ -22,6 +23,7 @@ from action_assistant.web.auth.login_codes import (
     LoginCodes,
     LoginRequest,
 )
+from action_assistant.web.auth.login_codes import claim as claim_login
 from action_assistant.web.auth.token_routes import shared_token_routes
 from action_assistant.web.auth.tokens import (
     NAME_LIMIT,
@@ -75,10 +77,9 @@ class ConfirmLogin(MakeToken, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 def routes(
-    app_state: EditorState, tokens: TokenFiles, *, limits: bool
+    app_state: EditorState, tokens: TokenFiles, codes: Held[LoginCodes], *, limits: bool
 ) -> list[ControllerRouterHandler]:
     """Return the routes of tokens."""
-    codes = LoginCodes()
 
     async def make(word: Confirmed) -> MadeToken:
         made = await to_thread.run_sync(
@@ -114,7 +115,7 @@ def _making(make_token: _Make) -> ControllerRouterHandler:
 
 
 def _of_programs(
-    tokens: TokenFiles, codes: LoginCodes, make: _Make, *, limits: bool
+    tokens: TokenFiles, codes: Held[LoginCodes], make: _Make, *, limits: bool
 ) -> list[ControllerRouterHandler]:
     """Return the routes by which a program that is not signed in asks for a token."""
     begun = TokenBuckets(_BEGUN_AT_ONCE, _BEGUN_PER_MINUTE / 60)
@@ -136,9 +137,8 @@ def _of_programs(
         admit(begun, request)
         tokens.check(data.name, data.days)
         wanted = tuple(sorted(completed(data.scopes)))
-        answer = codes.begin(
-            data.name, wanted, data.days, client_address(request.scope), client_network(request)
-        )
+        address, network = client_address(request.scope), client_network(request)
+        answer = await codes.call(LoginCodes.begin, data.name, wanted, data.days, address, network)
         return Response(answer, headers={"cache-control": "no-store"})
 
     @post(
@@ -152,7 +152,7 @@ def _of_programs(
     )
     async def claim(data: JSONBody[LoginSecret], request: _Asking) -> Response[Claimed]:
         admit(asked, request)
-        answer = await codes.claim(data.secret, make)
+        answer = await claim_login(codes, data.secret, make)
         return Response(answer, headers={"cache-control": "no-store"})
 
     @post(
@@ -165,12 +165,12 @@ def _of_programs(
     )
     async def cancel(data: JSONBody[LoginSecret], request: _Asking) -> None:
         admit(asked, request)
-        codes.cancel(data.secret)
+        await codes.call(LoginCodes.cancel, data.secret)
 
     return [begin, claim, cancel]
 
 
-def _of_people(tokens: TokenFiles, codes: LoginCodes) -> list[ControllerRouterHandler]:
+def _of_people(tokens: TokenFiles, codes: Held[LoginCodes]) -> list[ControllerRouterHandler]:
     """Return the routes by which a person answers a program that waits."""
 
     @post(
@@ -181,7 +181,7 @@ def _of_people(tokens: TokenFiles, codes: LoginCodes) -> list[ControllerRouterHa
         guards=[PersonOnly(), Needs("see")],
     )
     async def look(data: JSONBody[LoginCode], request: _Asking) -> LoginRequest:
-        return codes.look(data.code, identity_of(request).person.id)
+        return await codes.call(LoginCodes.look, data.code, identity_of(request).person.id)
 
     @post(
         "/api/logins/confirm",
@@ -192,7 +192,7 @@ def _of_people(tokens: TokenFiles, codes: LoginCodes) -> list[ControllerRouterHa
     )
     async def confirm(data: JSONBody[ConfirmLogin], request: _Asking) -> None:
         by = identity_of(request)
-        asked = codes.look(data.code, by.person.id)
+        asked = await codes.call(LoginCodes.look, data.code, by.person.id)
         beyond = completed(data.scopes) - set(asked.scopes)
         if beyond:
             raise BadInput(
@@ -200,7 +200,8 @@ def _of_people(tokens: TokenFiles, codes: LoginCodes) -> list[ControllerRouterHa
                 where={"path": "/scopes"},
             )
         tokens.require(by, data.name, completed(data.scopes), data.days)
-        codes.confirm(data.code, Confirmed(by, data.name, data.scopes, data.days))
+        word = Confirmed(by, data.name, data.scopes, data.days)
+        await codes.call(LoginCodes.confirm, data.code, word)
 
     @post(
         "/api/logins/refuse",
@@ -210,6 +211,6 @@ def _of_people(tokens: TokenFiles, codes: LoginCodes) -> list[ControllerRouterHa
         guards=[PersonOnly(), Needs("see")],
     )
     async def refuse(data: JSONBody[LoginCode], request: _Asking) -> None:
-        codes.refuse(data.code, identity_of(request).person.id)
+        await codes.call(LoginCodes.refuse, data.code, identity_of(request).person.id)
 
     return [look, confirm, refuse]

@@ -9,12 +9,19 @@ from typing import Final, NamedTuple, TypeVar
 from urllib.parse import quote
 
 import httpx
+import msgspec
 import websockets
 from websockets.asyncio.client import ClientConnection, connect
 
 from action_assistant.editor.cluster.owners import Elsewhere, Owners
 from action_assistant.editor.cluster.relay_seal import SCHEME, RelayedFacts, RelaySeal
-from action_assistant.errors import NotFound, OutcomeUnknown, Unavailable
+from action_assistant.errors import (
+    NotFound,
+    OutcomeUnknown,
+    Refused,
+    Unavailable,
+    refused_elsewhere,
+)
 from action_assistant.logs import request_id
 from action_assistant.web.auth.caller import caller
 
@@ -38,6 +45,7 @@ _GOODBYE_S: Final = 1.0
 _SAFE: Final = frozenset({"GET", "HEAD"})
 _LEFT_AS_IS: Final = "%/:?@!$&'()*+,;=~-._"  # of a path or query, beside letters and digits
 _SILENT: Final = "The editor that has this graph open does not answer; try again."
+_UNREADABLE: Final = "The answer of another editor cannot be read."
 _LOST: Final = "The editor that had this graph open has ended, and may have done it before that."
 
 
@@ -200,6 +208,23 @@ def _require_taken(status: int, challenge: str) -> None:
         raise _Unreached("it does not own it")
     if status == 401 and challenge == SCHEME:
         raise _Unreached("it does not take the seal: clocks differ by more than half a minute")
+
+
+class _Problem(msgspec.Struct, frozen=True):
+    """The part of problem details by which a refusal is raised again."""
+
+    type: str
+    detail: str
+    where: dict[str, object] | None = None
+
+
+def refusal(body: bytes) -> Refused:
+    """Return the refusal that another editor has answered, to be raised here."""
+    try:
+        problem = msgspec.json.decode(body, type=_Problem)
+    except msgspec.DecodeError:
+        return Unavailable(_UNREADABLE)
+    return refused_elsewhere(problem.type, problem.detail, problem.where)
 
 
 class OpenSocket(NamedTuple):

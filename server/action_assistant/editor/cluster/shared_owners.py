@@ -20,6 +20,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 
 from action_assistant.editor.cluster.chores import CHORES
 from action_assistant.editor.cluster.owners import Elsewhere, Here, Nobody, Owner
+from action_assistant.editor.cluster.shared_desk import SIGN_IN
 from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import START
 from action_assistant.journal.database import cause_of
@@ -78,7 +79,8 @@ _CLAIM: Final = (
         " beat_at = excluded.beat_at, draining_at = NULL"
     ),
     text(
-        "INSERT INTO head (stream, seq, chain) VALUES (:chores, 0, :start) ON CONFLICT DO NOTHING"
+        "INSERT INTO head (stream, seq, chain) VALUES (:chores, 0, :start), (:sign_in, 0, :start)"
+        " ON CONFLICT DO NOTHING"
     ),
 )
 _DRAIN: Final = text(f"UPDATE editor SET draining_at = {_NOW} WHERE life = :life")
@@ -251,7 +253,8 @@ class SharedOwners:
 
         def register(connection: Connection) -> None:
             values: dict[str, Any] = {"life": self._life, "slot": self._journal.slot}
-            values |= {"url": self._url, "version": VERSION, "chores": CHORES, "start": START}
+            values |= {"url": self._url, "version": VERSION, "start": START}
+            values |= {"chores": CHORES, "sign_in": SIGN_IN}
             for statement in _CLAIM:
                 connection.execute(statement, values)
             if self._draining:

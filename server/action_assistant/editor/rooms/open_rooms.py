@@ -94,11 +94,12 @@ class Rooms:
     @asynccontextmanager
     async def owned(self, stream: str) -> AsyncIterator[Owner]:
         """Return a context with the owner of a stream. If that is this editor, it stays the owner during it
-        and for some seconds, unless another one takes the stream. Raise Unavailable as `Owners` does."""
+        and for some seconds, of other streams than graphs until it ends, unless another one takes the stream. Raise Unavailable as `Owners` does."""
         with self._held(stream):
             owner = await self._owners.owner(stream)
             if isinstance(owner, Here):
-                self._taken.add(stream)
+                if graph_of(stream) is not None:
+                    self._taken.add(stream)
                 yield owner
                 return
         yield owner

@@ -7,10 +7,10 @@ from urllib.parse import quote, urlencode
 import httpx
 import msgspec
 
-from action_assistant.editor.cluster.peers import Call, Peers
+from action_assistant.editor.cluster.peers import Call, Peers, refusal
 from action_assistant.editor.rooms.batch import DocumentState
 from action_assistant.editor.rooms.room import Room
-from action_assistant.errors import OutcomeUnknown, Refused, Unavailable, refused_elsewhere
+from action_assistant.errors import OutcomeUnknown, Unavailable
 
 #: The path of rooms at the listener for other editors.
 ROOMS: Final = "/rooms/"
@@ -19,7 +19,7 @@ SEQ: Final = "x-seq"
 AUTHOR: Final = "author"
 EXPECTED: Final = "expected"
 _MOVED: Final = "This graph has just moved to another editor; try again."
-_UNREADABLE: Final = "The editor that has this graph open gave an answer that cannot be read."
+_UNREADABLE: Final = "The answer of the editor that has this graph open was lost."
 
 
 class SubmittedSeq(msgspec.Struct, frozen=True):
@@ -30,14 +30,6 @@ class SubmittedSeq(msgspec.Struct, frozen=True):
 
 #: A room wherever it is open, for edits of the server itself.
 AnyRoom: TypeAlias = "Room | RemoteRoom"
-
-
-class _Problem(msgspec.Struct, frozen=True):
-    """The part of problem details by which a refusal is raised again."""
-
-    type: str
-    detail: str
-    where: dict[str, object] | None = None
 
 
 class RemoteRoom:
@@ -82,13 +74,5 @@ class RemoteRoom:
             except httpx.HTTPError as error:
                 raise OutcomeUnknown(_UNREADABLE) from error
             if not answer.is_success:
-                raise _refusal(body)
+                raise refusal(body)
             return answer.headers, body
-
-
-def _refusal(body: bytes) -> Refused:
-    try:
-        problem = msgspec.json.decode(body, type=_Problem)
-    except msgspec.DecodeError:
-        return Unavailable(_UNREADABLE)
-    return refused_elsewhere(problem.type, problem.detail, problem.where)

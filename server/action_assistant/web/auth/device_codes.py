@@ -2,7 +2,8 @@
 
 The first browser shows a code of 8 characters for two minutes. The other one sends it, which uses the
 code up, and waits. Both show the same number of two digits. When the person confirms on the first
-browser, the other one gets a session of the same person. Codes are in memory only.
+browser, the other one gets a session of the same person. Codes are in memory only, and of several
+editors in that of one (`Held`).
 """
 
 import secrets
@@ -162,9 +163,14 @@ class DeviceCodes:
                 raise Unauthenticated("The other device was answered with no.")
         raise Unauthenticated("Nobody has confirmed this device in time. Ask for a new code.")
 
-    def collected(self, claim: str) -> None:
-        """Forget a device that has its session."""
+    def collect(self, claim: str) -> Confirmed:
+        """Return the session that a confirmed browser follows, and forget the code. Raise Unauthenticated as
+        `confirmed` does, and for all but the first of several that collect it."""
+        found = self.confirmed(claim)
+        if found is None:
+            raise Unauthenticated("Nobody has confirmed this device yet.")
         self._pending = {p.id: p for p in self._pending.values() if p.claim != claim}
+        return found
 
     def _of(self, id_: str, session: Session) -> _Pending:
         self._forget_old()

@@ -1,9 +1,10 @@
 """Sign-in of a program by a device code: the program shows a code, a person confirms it on the page.
 
-The codes live in memory only. A restart ends them, and the program asks for a new one. The token is made
+The codes live in memory only, and of several editors in that of one (`Held`). A restart ends them, and the program asks for a new one. The token is made
 when the program fetches it, so nothing is left of a code that nobody used.
 """
 
+import contextlib
 import hashlib
 import secrets
 import time
@@ -11,9 +12,11 @@ from collections.abc import Awaitable, Callable
 from typing import Final, Literal, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 
-from action_assistant.errors import Conflict, NotFound, TooMany, Unavailable
+from action_assistant.errors import Conflict, NotFound, Refused, TooMany, Unavailable
 from action_assistant.kit.token_bucket import Clock, TokenBuckets
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.identity import Identity, Scope
 from action_assistant.web.auth.tokens import MadeToken
 
@@ -100,6 +103,13 @@ class Confirmed(msgspec.Struct, frozen=True):
     days: float | None
 
 
+class Fetching(msgspec.Struct, frozen=True):
+    """The answer to a program, still without its token; `word`: by which the token may be made now."""
+
+    claimed: Claimed
+    word: Confirmed | None = None
+
+
 class LoginCodes:
     """The logins that wait. All methods run in the event loop, so that of two who use a code at
     once one wins."""
@@ -173,19 +183,16 @@ class LoginCodes:
         """Forget the login of this secret, if there is one."""
         self._logins.pop(_hash(secret), None)
 
-    async def claim(
-        self, secret: str, make: Callable[[Confirmed], Awaitable[MadeToken]]
-    ) -> Claimed:
-        """Return how far the login with this secret is, with its token when a person has confirmed
-        it. `make` makes the token; one of several calls at once gets it. Raise what `make` raises;
-        after Unavailable the program may ask again."""
+    def begin_fetch(self, secret: str) -> "Fetching":
+        """Return how far the login with this secret is. If a person has confirmed it, its token may be made
+        now, by the first of several calls; `end_fetch` has to follow."""
         self._forget()
         login = self._logins.get(_hash(secret))
         if login is None or login.state in {"fetching", "fetched"}:
-            return Claimed("gone")
+            return Fetching(Claimed("gone"))
         if login.state == "refused":
             self.cancel(secret)
-            return Claimed("refused")
+            return Fetching(Claimed("refused"))
         now = self._clock()
         early = now - login.asked_at < login.interval - _EARLY_S
         login.asked_at = now
@@ -193,18 +200,15 @@ class LoginCodes:
         if word is None:
             if early:
                 login.interval = min(_LONGEST_S, login.interval + _SLOWER_S)
-            return Claimed("slower" if early else "waiting", login.interval)
+            return Fetching(Claimed("slower" if early else "waiting", login.interval))
         login.state = "fetching"
-        try:
-            made = await make(word)
-        except Unavailable:
-            login.state = "confirmed"
-            raise
-        except BaseException:
-            self.cancel(secret)
-            raise
-        login.state = "fetched"
-        return Claimed("granted", login.interval, made)
+        return Fetching(Claimed("granted", login.interval), word)
+
+    def end_fetch(self, secret: str, *, is_made: bool) -> None:
+        """Note that the token was made, or that it may be fetched again."""
+        login = self._logins.get(_hash(secret))
+        if login is not None:
+            login.state = "fetched" if is_made else "confirmed"
 
     def _find(self, code: str, person: str) -> _Login:
         """Return the login with a code that a person types, with or without the hyphen."""
@@ -223,6 +227,29 @@ class LoginCodes:
         now = self._clock()
         for key in [key for key, each in self._logins.items() if each.ends_at <= now]:
             del self._logins[key]
+
+
+async def claim(
+    codes: Held[LoginCodes], secret: str, make: Callable[[Confirmed], Awaitable[MadeToken]]
+) -> Claimed:
+    """Return how far the login with this secret is, with its token when a person has confirmed it. `make`
+    makes the token; one of several calls at once gets it. Raise what `make` raises; after Unavailable the
+    program may ask again."""
+    fetching = await codes.call(LoginCodes.begin_fetch, secret)
+    if fetching.word is None:
+        return fetching.claimed
+    try:
+        made = await make(fetching.word)
+    except Unavailable:
+        with contextlib.suppress(Refused):  # or the program asks for a new code
+            await codes.call(LoginCodes.end_fetch, secret, is_made=False)
+        raise
+    except BaseException:
+        with contextlib.suppress(Refused):
+            await codes.call(LoginCodes.cancel, secret)
+        raise
+    await codes.call(LoginCodes.end_fetch, secret, is_made=True)
+    return replace(fetching.claimed, made=made)
 
 
 def shown(code: str) -> str:

@@ -32,6 +32,7 @@ from action_assistant.web.auth.access import (
 from action_assistant.web.auth.browser_names import browser_name
 from action_assistant.web.auth.caller import Origin, acting_for, client_network
 from action_assistant.web.auth.confirmations import is_sure
+from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.device_codes import DeviceCodes, WaitingDevice
 from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
 from action_assistant.web.auth.people_files import NAME_LIMIT, PeopleFiles, PersonFile
@@ -392,7 +393,7 @@ def session_routes(
     *,
     revoked: Revocations,
     standings: Standings,
-    codes: DeviceCodes,
+    codes: Held[DeviceCodes],
     device_added: Callable[[Session, str, str], Awaitable[None]] | None = None,
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/session`. `device_added` stores that a device was added, with
@@ -410,7 +411,7 @@ async def _added(session: Session, browser: str, address: str) -> None:
 def _new_device(
     sessions: Sessions,
     standings: Standings,
-    codes: DeviceCodes,
+    codes: Held[DeviceCodes],
     added: Callable[[Session, str, str], Awaitable[None]],
 ) -> list[ControllerRouterHandler]:
     @post(
@@ -423,7 +424,8 @@ def _new_device(
     )
     async def send(data: JSONBody[CodeOfDevice], request: _Asking) -> WaitingDevice:
         sessions.admit(request)
-        return codes.claim(data.code, browser_of(request), client_address(request.scope))
+        browser, address = browser_of(request), client_address(request.scope)
+        return await codes.call(DeviceCodes.claim, data.code, browser, address)
 
     @post(
         "/api/session/device/answer",
@@ -434,16 +436,13 @@ def _new_device(
         guards=[Open()],
     )
     async def collect(data: JSONBody[ClaimOfDevice], request: _Asking) -> Response[DeviceAnswer]:
-        confirmed = codes.confirmed(data.claim)
-        if confirmed is not None:
-            await to_thread.run_sync(standings.browsers.require_room, confirmed.session.person.id)
-            # Another request may have used the claim meanwhile: from here on nothing waits until it
-            # is used up.
-            confirmed = codes.confirmed(data.claim)
+        confirmed = await codes.call(DeviceCodes.confirmed, data.claim)
         if confirmed is None:
             return Response(DeviceAnswer(), status_code=200)
+        await to_thread.run_sync(standings.browsers.require_room, confirmed.session.person.id)
+        # Another request may have used the claim meanwhile.
+        confirmed = await codes.call(DeviceCodes.collect, data.claim)
         session = sessions.follow(confirmed.session)
-        codes.collected(data.claim)
         with acting_for(session.person.id, connection_of(session, request)):
             await added(session, confirmed.browser, confirmed.address)
         await sessions.leave(request)
