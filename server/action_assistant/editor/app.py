@@ -160,11 +160,13 @@ async def _owners(
     if given is not None or settings.cluster is None:
         yield given or Alone()
         return
-    from action_assistant.editor.cluster.shared_owners import SharedOwners  # slow to load
+    from action_assistant.editor.cluster.same_folder import in_one_folder  # slow to load
+    from action_assistant.editor.cluster.shared_owners import SharedOwners
 
     async with SharedOwners.joined(journal, settings.database, settings.cluster.url) as owners:
         await owners.require_same_token(Keys.of(settings.data).relay_key)
-        yield owners
+        async with in_one_folder(journal, settings.data):
+            yield owners
 
 
 @asynccontextmanager

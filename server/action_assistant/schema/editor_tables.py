@@ -245,7 +245,8 @@ outbox, receiver = outbox_tables(EDITOR)
 #: One of several editors that share this database, with the slot in which it writes. `life`: a random number of
 #: its process. `url`: where it takes requests of other editors. `beat_at`: when it last said that it lives
 #: (µs UTC, by the clock of the database); `draining_at`: since when it gives its rooms up; `proof`:
-#: an HMAC that all editors with its token have.
+#: an HMAC that all editors with its token have; `mark`: the name of its file in the data folder; `met`: the
+#: marks of others whose files it has found there.
 editor: Final = Table(
     "editor",
     EDITOR,
@@ -256,6 +257,8 @@ editor: Final = Table(
     Column("beat_at", BigInteger, nullable=False),
     Column("draining_at", BigInteger),
     Column("proof", LargeBinary),
+    Column("mark", Text),
+    Column("met", Text),
 )
 #: The editor that owns a stream, by its life, since it took the stream with this epoch. It only shows where to
 #: ask; `head.epoch` says who may append. `people`: JSON of who is in the room, null for nobody.

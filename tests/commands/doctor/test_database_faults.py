@@ -76,7 +76,7 @@ def test_before_an_upgrade_one_asks_only_what_it_changes_and_needs(
         altered(data / f"{branch}.db", f"UPDATE alembic_version SET version_num = '{older}'")
     code, said = asked()
     assert code == 0, "what an upgrade does is a warning"
-    assert "(proofs of editors, people of rooms), after a copy of" in said
+    assert "(people of rooms, folders of editors), after a copy of" in said
     assert "(outbox, notes at moments), after a copy of" in said
     assert "MiB there before it changes tables; with what has to stay free it needs" in said
     one = max((data / f"{branch}.db").stat().st_size for branch in ("editor", "runner"))

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 import random
+import shutil
 import signal
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -25,6 +26,7 @@ from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from editor.cluster.several import OneOfSeveral, several
 from editor.cluster.test_relay import closed, until
+from editor.process import BEARER
 from journal.servers import Server
 
 FROZEN_S = float(os.environ.get("SOAK_FROZEN_S", "8"))
@@ -390,3 +392,50 @@ def test_an_editor_with_another_token_is_refused(
         "has another token. All editors of one database need the same token"
         in stranger.log.read_text()
     )
+
+
+@pytest.mark.parametrize("is_copied", [False, True])
+def test_an_editor_with_another_data_folder_is_refused(
+    editors: list[OneOfSeveral], tmp_path: Path, is_copied: bool
+) -> None:
+    data = tmp_path / "data"
+    if is_copied:
+        shutil.copytree(editors[0].data, data)
+    stranger = OneOfSeveral(data, editors[0].database, 9)
+    stranger.begin()
+    assert stranger.child.wait(60) != 0
+    said = stranger.log.read_text()
+    assert f"does not find {data}/" in said
+    assert "All editors of one database need the same data folder" in said
+    assert all(each.child.poll() is None for each in editors)
+
+
+async def test_an_ended_session_is_out_at_every_editor_also_without_the_database(
+    editors: list[OneOfSeveral], postgres: Server
+) -> None:
+    one = editors[0]
+    sent = {"token": BEARER["authorization"][7:], "name": "Ada"}
+    async with httpx.AsyncClient(base_url=one.url, trust_env=False, timeout=30) as browser:
+        origin = {"origin": one.url}
+        assert (await browser.post("/api/session", json=sent, headers=origin)).is_success
+        value = browser.cookies[f"aa_{one.port}"]
+
+        async def statuses() -> set[int]:
+            """Return what all editors say to this session."""
+            found = set()
+            for each in editors:
+                cookie = {"cookie": f"aa_{each.port}={value}"}
+                async with httpx.AsyncClient(base_url=each.url, trust_env=False) as other:
+                    found.add((await other.get("/api/session", headers=cookie)).status_code)
+            return found
+
+        assert await statuses() == {200}
+        postgres.stop()
+        try:
+            left = await browser.delete("/api/session", headers=origin)
+            assert left.status_code == 204
+            assert await statuses() == {401}
+        finally:
+            postgres.start()
+    for each in editors:
+        await asyncio.to_thread(each.wait)
