@@ -1,20 +1,24 @@
 """The entrance takes what another editor of the server has sealed, once, and nothing else."""
 
+import asyncio
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import httpx
 import pytest
+from pycrdt import Doc, Map
 
 from action_assistant.editor.cluster.owners import Alone, Elsewhere, Owner
 from action_assistant.editor.cluster.peers import Peers
 from action_assistant.editor.cluster.relay_seal import RelayedFacts, RelaySeal
 from action_assistant.editor.rooms.remote_room import RemoteRoom
-from action_assistant.errors import Overtaken, Unavailable
+from action_assistant.errors import BadInput, Overtaken, Unavailable
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person
 from editor.client import updates
 from editor.cluster.conftest import Pair
+from editor.cluster.test_relay import until
 from support.product import TOKEN
 
 SEAL = RelaySeal(Keys(TOKEN).relay_key)
@@ -195,4 +199,65 @@ async def test_a_remote_room_takes_edits_of_the_server_as_the_room_would(pair: P
     pair.give(f"graph/{graph}", pair.here)
     with pytest.raises(Unavailable):
         await room.now()
+    await peers.aclose()
+
+
+async def test_edits_of_people_wait_for_a_turn_in_a_remote_room(pair: Pair) -> None:
+    graph = pair.new_graph()
+    peers = Peers(OwnsNothing(pair.there.inner), SEAL)
+    room = RemoteRoom(f"graph/{graph}", peers)
+    mine: Doc[Any] = Doc()
+    things = mine.get("meta", type=Map)
+    async with pair.here.joined(graph, mine):
+        before, _ = await room.now()
+        keys = iter(["one", "two", "three"])
+
+        async def compute(state: bytes, seq: int) -> bytes:
+            """Let somebody edit meanwhile, as far as they can."""
+            assert seq == before
+            things[next(keys)] = 1.0
+            await asyncio.sleep(0.5)  # nothing tells that an edit waits
+            doc: Doc[Any] = Doc()
+            doc.apply_update(state)
+            known = doc.get_state()
+            doc.get("meta", type=Map)["seen"] = float("one" in doc.get("meta", type=Map))
+            update: bytes = doc.get_update(known)
+            return update
+
+        assert await room.submit_in_turn("ann", compute) == before + 1
+        await until(lambda: things.get("seen") == 0.0)
+        while room.seq < before + 2:  # the edit that waited is stored
+            await room.now()
+        before = room.seq
+
+        async def compute_badly(_: bytes, __: int) -> bytes:
+            things[next(keys)] = 1.0
+            raise BadInput("mine")
+
+        with pytest.raises(BadInput, match="mine"):
+            await room.submit_in_turn("ann", compute_badly)
+        things[next(keys)] = 1.0
+        while room.seq < before + 2:  # what waited is stored, and what came after it
+            await room.now()
+    await peers.aclose()
+
+
+async def test_a_turn_that_takes_too_long_is_over_and_people_go_on(pair: Pair) -> None:
+    graph = pair.new_graph()
+    peers = Peers(OwnsNothing(pair.there.inner), SEAL)
+    room = RemoteRoom(f"graph/{graph}", peers)
+    mine: Doc[Any] = Doc()
+    things = mine.get("meta", type=Map)
+    (update,) = updates(("a", "1"))
+    async with pair.here.joined(graph, mine):
+        before, _ = await room.now()
+
+        async def compute(_: bytes, __: int) -> bytes:
+            things["meanwhile"] = 1.0
+            while (await room.now())[0] == before:  # answered when the turn is over
+                pass
+            return update
+
+        with pytest.raises(Overtaken):
+            await room.submit_in_turn("ann", compute)
     await peers.aclose()

@@ -22,11 +22,20 @@ from action_assistant.editor.cluster.relay_seal import (
 )
 from action_assistant.editor.cluster.shared_desk import CALLS, SIGN_IN, SharedDesk
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.remote_room import AUTHOR, EXPECTED, ROOMS, SEQ, SubmittedSeq
+from action_assistant.editor.rooms.remote_room import (
+    AUTHOR,
+    EXPECTED,
+    ROOMS,
+    SEQ,
+    TURN,
+    TURN_HEADER,
+    SubmittedSeq,
+)
+from action_assistant.editor.rooms.remote_turns import RemoteTurns
 from action_assistant.errors import NotFound, Refused, Unauthenticated, Unavailable
 from action_assistant.logs import begin
 from action_assistant.web.auth.access import origin_by
-from action_assistant.web.auth.caller import acting_for
+from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.http.refusals import answer, refuse, refuse_socket
 
@@ -62,6 +71,7 @@ class Entrance:
         self._seal = seal
         self._rooms = rooms
         self._desk = desk
+        self._turns: Final = RemoteTurns(rooms)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request of another editor. The parameters are those of ASGI."""
@@ -126,20 +136,35 @@ class Entrance:
         self, stream: str, scope: Any, send: Send, facts: RelayedFacts, body: bytes
     ) -> None:
         """Answer what a `RemoteRoom` asks: the document (GET), or to store an edit (POST)."""
+        query = {name: value for name, (value,) in parse_qs(scope["query_string"].decode()).items()}
+        if TURN in query:
+            await self._turn(stream, scope["method"], send, facts, query[TURN], body)
+            return
         async with self._rooms().enter(stream) as room:
             if scope["method"] == "GET":
                 seq, state = await room.now()
                 await answer(send, 200, [(SEQ.encode(), str(seq).encode())], state)
                 return
-            query = {
-                name: value for name, (value,) in parse_qs(scope["query_string"].decode()).items()
-            }
             author, expected = query[AUTHOR], query.get(EXPECTED)
-            identity = facts.identity
-            is_theirs = identity is not None and identity.person.id == author
-            with acting_for(author, origin_by(identity) if identity and is_theirs else None):
+            with acting_for(author, _origin(facts, author)):
                 seq = await room.submit(body, author, None if expected is None else int(expected))
             await answer(send, 200, [], msgspec.json.encode(SubmittedSeq(seq)))
+
+    async def _turn(
+        self, stream: str, method: str, send: Send, facts: RelayedFacts, turn: str, body: bytes
+    ) -> None:
+        """Begin a turn in a room for an author (GET), store its edit (POST), or end it without one (DELETE)."""
+        if method == "GET":
+            with acting_for(turn, _origin(facts, turn)):
+                made, (seq, state) = await self._turns.begin(stream, turn)
+            fields = [(SEQ.encode(), str(seq).encode()), (TURN_HEADER.encode(), made.encode())]
+            await answer(send, 200, fields, state)
+        elif method == "POST":
+            seq = await self._turns.end(turn, body)
+            await answer(send, 200, [], msgspec.json.encode(SubmittedSeq(seq)))
+        else:
+            self._turns.cancel(turn)
+            await answer(send, 204, [], b"")
 
     async def _verified(self, scope: Any, receive: Receive) -> tuple[RelayedFacts, bytes]:
         """Return who asks, and the body. Raise Unauthenticated, before the body is read, for what no editor has
@@ -161,6 +186,12 @@ def _inner_stream(path: str) -> str | None:
     if path.startswith(CALLS):
         return SIGN_IN
     return path.removeprefix(ROOMS) if path.startswith(ROOMS) else None
+
+
+def _origin(facts: RelayedFacts, author: str) -> Origin | None:
+    """Return from where an author acts; None if another person or the server itself asks."""
+    identity = facts.identity
+    return origin_by(identity) if identity is not None and identity.person.id == author else None
 
 
 async def _misdirect(scope: Any, receive: Receive, send: Send) -> None:

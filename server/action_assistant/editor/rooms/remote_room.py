@@ -1,6 +1,7 @@
 """A room that another editor has open, for edits of the server itself."""
 
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Final, TypeAlias
 from urllib.parse import quote, urlencode
 
@@ -10,7 +11,7 @@ import msgspec
 from action_assistant.editor.cluster.peers import Call, Peers, refusal
 from action_assistant.editor.rooms.batch import DocumentState
 from action_assistant.editor.rooms.room import Room
-from action_assistant.errors import OutcomeUnknown, Unavailable
+from action_assistant.errors import OutcomeUnknown, Refused, Unavailable
 
 #: The path of rooms at the listener for other editors.
 ROOMS: Final = "/rooms/"
@@ -18,6 +19,9 @@ SEQ: Final = "x-seq"
 #: The parameters in the query of an edit: its author, and the number of the last change before it.
 AUTHOR: Final = "author"
 EXPECTED: Final = "expected"
+#: The parameter with the id of a turn, which an answer has in the header; or, at first, with its author.
+TURN: Final = "turn"
+TURN_HEADER: Final = "x-turn"
 _MOVED: Final = "This graph has just moved to another editor; try again."
 _UNREADABLE: Final = "The answer of the editor that has this graph open was lost."
 
@@ -45,24 +49,35 @@ class RemoteRoom:
     async def submit(self, update: bytes, author: str, expected: int | None = None) -> int:
         """Do what `Room.submit` does. Raise OutcomeUnknown, too, if the answer was lost."""
         query = {AUTHOR: author} | ({} if expected is None else {EXPECTED: str(expected)})
-        call = Call("POST", f"{self._target}?{urlencode(query)}", body=update, is_inner=True)
-        _, body = await self._ask(call)
-        self.seq = msgspec.json.decode(body, type=SubmittedSeq).seq
-        return self.seq
+        target = f"{self._target}?{urlencode(query)}"
+        return await self._stored(Call("POST", target, body=update, is_inner=True))
 
     async def submit_in_turn(
         self, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
     ) -> int:
-        """Do what `Room.submit_in_turn` does, but let no edits wait: whoever is faster overtakes this one.
+        """Do what `Room.submit_in_turn` does; the time for `compute` includes the way to the other editor.
         Raise OutcomeUnknown, too, if the answer was lost."""
-        seq, state = await self.now()
-        return await self.submit(await compute(state, seq), author, seq)
+        begin = Call("GET", f"{self._target}?{urlencode({TURN: author})}", is_inner=True)
+        headers, state = await self._ask(begin)
+        turn = f"{self._target}?{urlencode({TURN: headers[TURN_HEADER]})}"
+        try:
+            update = await compute(state, int(headers[SEQ]))
+        except BaseException:
+            with suppress(Refused):  # or the room goes on by itself
+                await self._ask(Call("DELETE", turn, is_inner=True))
+            raise
+        return await self._stored(Call("POST", turn, body=update, is_inner=True))
 
     async def now(self) -> DocumentState:
         """Return the document and the number of its last change, as `Room.now` does."""
         headers, state = await self._ask(Call("GET", self._target, is_inner=True))
         self.seq = int(headers[SEQ])
         return DocumentState(self.seq, state)
+
+    async def _stored(self, call: Call) -> int:
+        _, body = await self._ask(call)
+        self.seq = msgspec.json.decode(body, type=SubmittedSeq).seq
+        return self.seq
 
     async def _ask(self, call: Call) -> tuple[httpx.Headers, bytes]:
         """Return the header fields and the body of an answer. Raise the refusal of the other editor."""
