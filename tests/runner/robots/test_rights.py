@@ -53,6 +53,12 @@ def test_a_robot_without_rules_refuses_nobody() -> None:
     assert why(RobotRights(name="David"), BEN) is None
 
 
+def test_an_empty_list_refuses_everybody_and_says_so() -> None:
+    rights = RobotRights(name="David", rules=Rules(operators=()), set_by=ref(OLGA))
+    for each in (BEN, OLGA):
+        assert why(rights, each) == ("You may not start on David: its list names nobody. Ask Olga.")
+
+
 def test_a_refusal_says_who_may_and_whom_to_ask() -> None:
     rights = RobotRights(name="David", rules=LISTED, set_by=ref(OLGA))
     assert why(rights, BEN) == (

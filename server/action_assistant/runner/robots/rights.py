@@ -312,8 +312,9 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
         if own:
             ended = _day(max(each.until or 0 for each in own))
             return f"{who} may not start on {self.name} any more: that right ended on {ended}. Ask {asked}."
-        names = _either(each.name or each.id for each in self.rules.operators) or "nobody"
-        return f"{who} may not start on {self.name}: only {names} may. Ask {asked}."
+        names = _either(each.name or each.id for each in self.rules.operators)
+        may = f"only {names} may" if names else "its list names nobody"
+        return f"{who} may not start on {self.name}: {may}. Ask {asked}."
 
     def _no_baton(self, identity: Identity, who: str) -> str:
         if not self.rules.baton:
