@@ -47,7 +47,8 @@ test("a simulated run waits at a breakpoint, goes on to an action, and Stop ends
   const led = dialog(page).getByRole("radio", { name: /^Lead it/ });
   const start = dialog(page).getByRole("button", { name: /^Run v\d+, step by step, in/ });
 
-  await page.getByRole("button", { name: "Choose where to start" }).click();
+  // One press would hand the graph over whole, and nothing would wait.
+  await page.getByRole("button", { name: "Run v1 in the simulator …" }).click();
   await expect(led).toBeChecked();
   await expect(dialog(page)).toContainText("Only the simulator plays: nothing moves.");
   await expect(dialog(page)).not.toContainText("When a robot does not answer");

@@ -24,6 +24,7 @@ import { serverNow } from "../clock/server-clock";
 import { scriptOf } from "../dry-run/script";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, useEditorSummary } from "../editor/editor";
+import { breakpointsIn } from "../graph/breakpoints";
 import { READY_TEMPLATES } from "../graph/edit";
 import { isReadyMade } from "../graph/questions";
 import { robotNames } from "../graph/robots";
@@ -251,7 +252,7 @@ function Start({ settle, look }: Settled & Pick<ComponentProps<typeof StartContr
   const { id, graph, seq, obstacle, blocks, asks, compact, phone } = useEditorSummary();
   const more = {
     blocks,
-    asks: asks !== "" || graph.actions.some(isReadyMade),
+    asks: asks !== "" || graph.actions.some(isReadyMade) || breakpointsIn(graph).size > 0,
     compact,
     thumb: phone,
   };

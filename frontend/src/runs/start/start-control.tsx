@@ -26,7 +26,8 @@ interface Props {
   obstacle: string | null;
   /** The counts of problems that are the reason, in words, for a badge; "" without any. */
   blocks: string;
-  /** The start asks for values, or its graph asks people and has to be led: it is looked at first. */
+  /** The start asks for values, or its graph asks people or has breakpoints and has to be led: it is looked at
+   * first. */
   asks: boolean;
   compact?: boolean;
   /** In two lines, within reach of a thumb. */
