@@ -1,7 +1,7 @@
 /** Somebody finds out who broke a graph, looks at how it was, and takes it back. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved, umrfOf } from "./canvas";
+import { add, boxOf, card, saved, umrfOf } from "./canvas";
 import { type Person, Product } from "./product";
 import { choose, post, ran, setSpeed, VALVES, violations } from "./valves";
 
@@ -129,4 +129,29 @@ test("what broke it is undone", async () => {
   await expect(entries(page).first()).toContainText("undid what Mari did");
   const { actions } = await umrfOf(product, graph);
   expect(actions.map(({ name }) => name).sort()).toEqual(["Cool", "Drive", "Report"]);
+});
+
+test("beside the open list a moment of the past is looked at whole, and restored there", async ({
+  browser,
+}) => {
+  await add(ada.page, "Nod");
+  await saved(ada.page);
+  const eve = await product.person(browser, "Eve", { panels: "folded" });
+  const { page } = eve;
+  await page.goto(`${product.url}/graphs/${graph}`);
+  const counts = page.getByTitle(/prevents? a start$/).filter({ visible: true });
+  await expect(card(page, "Nod")).toBeVisible();
+  await expect(counts.first()).toBeVisible();
+  await page.getByRole("button", { name: "History", exact: true }).click();
+  await entries(page).filter({ hasText: "imported" }).getByRole("button").first().click();
+  await expect(card(page, "Nod")).toHaveCount(0);
+  await expect(counts).toHaveCount(0); // they are those of now
+  const list = await boxOf(page.getByRole("complementary", { name: "Library" }));
+  const title = await boxOf(bar(page).getByText("You look at the past."));
+  expect(title.x).toBeGreaterThanOrEqual(list.x + list.width);
+  await bar(page).getByRole("button", { name: "Restore" }).click();
+  await expect(bar(page)).toHaveCount(0);
+  await expect(card(page, "Drive")).toContainText("0.4");
+  await expect(card(ada.page, "Nod")).toHaveCount(0);
+  expect(eve.failures).toEqual([]);
 });

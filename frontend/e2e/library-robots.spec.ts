@@ -62,7 +62,7 @@ test("what a robot has is told apart from the library, and taken over", async ({
   await expect(page.getByRole("table", { name: "Takes" })).toContainText("knee");
   await page.getByRole("tab", { name: "History" }).click();
   await page
-    .getByRole("button", { name: /^Make it so again/ })
+    .getByRole("button", { name: /^Restore/ })
     .first()
     .click();
   await expect(robots).toContainText("height is string");

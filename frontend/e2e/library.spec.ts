@@ -152,7 +152,7 @@ test("edits of an action are undone, and its history leads back", async ({ brows
   await saved(page);
   await page.getByRole("tab", { name: "History" }).click();
   await page
-    .getByRole("button", { name: /^Make it so again/ })
+    .getByRole("button", { name: /^Restore/ })
     .last()
     .click();
   await expect(page.getByText("Takes none.")).toBeVisible();

@@ -207,7 +207,7 @@ test("two people and a run in between: who broke it is found, it is restored, an
   const good = versions(page).filter({ hasText: "before the steam leak" });
   await expect(versions(page).first()).toContainText(/Run \d+\s*halted/);
   await good.getByRole("button", { name: /before the steam leak/ }).click();
-  await good.getByRole("button", { name: "Make it so again" }).click();
+  await good.getByRole("button", { name: /^Restore v/ }).click();
   await expect(bar(page)).toHaveCount(0);
   for (const each of [page, mari.page]) await expect(card(each, "Cool")).toBeVisible();
   expect(JSON.stringify(await umrfOf(product, graph))).toContain('"pvf_value":0.9');
@@ -215,5 +215,5 @@ test("two people and a run in between: who broke it is found, it is restored, an
   await openHistory(page, "Versions");
   await expect(versions(page).first()).toContainText(/Run \d+\s*finished/, { timeout: 30_000 });
   await openHistory(page, "History");
-  await expect(panel(page)).toContainText("made it so again");
+  await expect(panel(page)).toContainText("restored it");
 });

@@ -429,6 +429,7 @@ export function Editor(props: Props) {
   };
   const beginning = overlay?.kind === "begin" ? overlay : null;
   const begins = { beginning, endBeginning: editor.closeOverlay };
+  const toldNow = context.past === null ? told : NOTHING_TOLD;
   const summary = useSummary(context, link, { seq: problems?.seq, told }, place, begins);
   const { compact, phone } = summary;
   const { isTurned } = useTopDown();
@@ -472,7 +473,7 @@ export function Editor(props: Props) {
           seq={context.past?.at ?? link.seq}
           panel={editor.panel}
           problems={context.past === null ? problems : undefined}
-          told={context.past === null ? told : NOTHING_TOLD}
+          told={toldNow}
           threads={threads}
         />
       </DetailsPane>
@@ -482,14 +483,14 @@ export function Editor(props: Props) {
   return (
     <EditorContextProvider context={context}>
       <EditorSummaryContext value={summary}>
-        <props.Bar {...barParts(props, context, summary, told, name, search, rename)} />
+        <props.Bar {...barParts(props, context, summary, toldNow, name, search, rename)} />
         {phone ? (
           <PhoneLayout
             {...{ ...parts, drawn, start: props.start, held: props.held, sign: props.sign }}
             onCanvas={isDryOrPast}
           />
         ) : (
-          <DesktopLayout {...parts} wide={!compact} told={told} list={props.list} />
+          <DesktopLayout {...parts} wide={!compact} told={toldNow} list={props.list} />
         )}
         {beginning !== null && props.begin}
       </EditorSummaryContext>

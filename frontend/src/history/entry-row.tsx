@@ -107,7 +107,7 @@ function WaysBack({ entry, now, busy, onRevert, onRestore }: Props) {
           leftSection={<IconRestore size={14} aria-hidden />}
           onClick={onRestore}
         >
-          Make it so again<span className="visually-hidden"> as at {at}</span>
+          Restore<span className="visually-hidden"> the graph as at {at}</span>
         </Button>
       )}
     </div>

@@ -82,7 +82,7 @@ function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
             leftSection={<IconRestore size={14} aria-hidden />}
             onClick={() => goBack.mutate()}
           >
-            Make it so again<span className="visually-hidden"> as on {when}</span>
+            Restore<span className="visually-hidden"> it as on {when}</span>
           </Button>
         )}
       </div>

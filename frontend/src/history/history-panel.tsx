@@ -50,7 +50,7 @@ function didWords(entry: HistoryEntry, entries: readonly HistoryEntry[], now: nu
   if (entry.restored === undefined) return doneWords(entry);
   const of = entryAt(entries, entry.restored);
   const at = of === null ? null : Date.parse(of.until);
-  return at === null ? "made it so again" : `made it so again as ${day(at, now)}`;
+  return at === null ? "restored it" : `restored it as of ${day(at, now)}`;
 }
 
 /** Loads what is older as soon as one comes near the end. */

@@ -19,6 +19,7 @@ import { CompareWith, useRunning } from "./compare-with";
 import { momentWords, useCompared } from "./compared";
 import type { GraphChanges } from "./graph-difference";
 import style from "./past-bar.module.css";
+import { useGoingBack } from "./restoring";
 import { marksOf, Scrubber } from "./scrubber";
 import { EarlierCanvas, type SideBySide, sideBySide } from "./side-by-side";
 import { useTimeline } from "./timeline";
@@ -77,7 +78,8 @@ interface Props {
 export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
   const place = useWatched(wanted) ?? drawn;
   const context = useEditorContext();
-  const { id, lookAt } = context;
+  const { id, lookAt, mayGoBack } = context;
+  const { busy, restore } = useGoingBack(context);
   const { seq } = useThrottledLink();
   const now = useNow(60_000);
   const timeline = useTimeline(id);
@@ -112,6 +114,16 @@ export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
           <span>Nothing here changes the graph.</span>
         </p>
         <span className={style.when}>{momentWords(entries, place.at, now)}</span>
+        {mayGoBack && place.at < seq && (
+          <Button
+            size="compact-sm"
+            variant="default"
+            loading={busy}
+            onClick={() => void restore(place.at)}
+          >
+            Restore
+          </Button>
+        )}
         <Button size="compact-sm" variant="filled" onClick={() => lookAt(null)}>
           Back to now
         </Button>

@@ -150,7 +150,7 @@ function WhoSetWhat({ of, what }: { of: string; what: string }) {
           leftSection={<IconRestore size={15} aria-hidden />}
           onClick={() => void restore(past.at, of)}
         >
-          Make {what} so again
+          Restore {what}
         </Button>
       )}
     </>

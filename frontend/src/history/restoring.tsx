@@ -42,7 +42,7 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
           leftSection={<IconRestore size={15} aria-hidden />}
           onClick={() => void restore(at)}
         >
-          Make the graph so again
+          Restore the graph
         </Button>
       )}
       <Button

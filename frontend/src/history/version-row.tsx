@@ -135,7 +135,7 @@ function Ways(props: Props) {
           leftSection={<IconRestore size={14} aria-hidden />}
           onClick={onRestore}
         >
-          Make it so again
+          Restore {listed.number}
         </Button>
       )}
       <ReleaseButton version={listed.version} number={listed.number} />
