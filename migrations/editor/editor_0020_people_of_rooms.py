@@ -9,6 +9,8 @@ revision: str = "editor_0020"
 down_revision: str | None = "editor_0019"
 branch_labels: Sequence[str] | None = None
 depends_on: Sequence[str] | None = None
+# Whether editors of the revision before can go on beside it (CONTRIBUTING.md, Migrations).
+expands: bool = True
 
 
 def upgrade() -> None:

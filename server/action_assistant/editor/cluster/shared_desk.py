@@ -1,4 +1,4 @@
-"""States that live in memory while somebody signs in, of which one of several editors has all (decision 177).
+"""States that live in memory while somebody signs in, of which one of several editors has all (decision 178).
 
 The owner of the stream `sign-in` has them. Other editors call it, by the way of relayed requests. Codes and secrets
 are in these calls, so both they and their answers are encrypted, under a key that follows from the token.

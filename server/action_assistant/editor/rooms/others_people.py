@@ -1,4 +1,4 @@
-"""Shows on lists who is in the graphs that other editors have open (decision 177).
+"""Shows on lists who is in the graphs that other editors have open (decision 178).
 
 Each editor writes beside the streams that it owns, in the table `room`, who is in their rooms, and reads what the
 others have written. A row ends with the ownership, and counts only while its editor lives.
