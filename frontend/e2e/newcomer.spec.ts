@@ -20,7 +20,7 @@ test.afterAll(async () => {
 const USED =
   /breakpoint|go on|step by step|in the queue|repeat|second person|at most|hardware stop|battery|visible page|asks you|limits|opened|values of the start/i;
 
-async function shows(page: Page, nothing: RegExp): Promise<void> {
+async function showsNone(page: Page, nothing: RegExp): Promise<void> {
   // biome-ignore lint/performance/useDomNodeTextContent: what is on screen counts
   expect(await page.locator("body").innerText()).not.toMatch(nothing);
 }
@@ -39,7 +39,7 @@ test("a graph, its run and the list of runs show nothing of led runs until they 
   const made = await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers });
   await page.goto(`${product.url}/graphs/${made.id}`);
   await saved(page);
-  await shows(page, USED);
+  await showsNone(page, USED);
 
   await page.getByRole("button", { name: "Choose where to start" }).click();
   const dialog = page.getByRole("dialog");
@@ -53,7 +53,7 @@ test("a graph, its run and the list of runs show nothing of led runs until they 
   const runs = () =>
     product.ask<{ id: string; state: string }[]>("/api/runs", {}, product.runnerUrl);
   await expect.poll(async () => (await runs())[0]?.state, { timeout: 20_000 }).toBe("finished");
-  await shows(page, USED);
+  await showsNone(page, USED);
   const [run] = await runs();
   const pages = {
     [`/runs/${run?.id}`]: "Facts",
@@ -69,7 +69,7 @@ test("a graph, its run and the list of runs show nothing of led runs until they 
       await page.setViewportSize({ width, height });
       await page.goto(`${product.url}${path}`);
       await expect(page.locator("body")).toContainText(content);
-      await shows(page, path === "/robots" ? /breakpoint|in the queue|repeat/i : USED);
+      await showsNone(page, path === "/robots" ? /breakpoint|in the queue|repeat/i : USED);
       await page.screenshot({
         path: test.info().outputPath(`${path.replaceAll("/", "_")}-${width}.png`),
       });

@@ -1,4 +1,5 @@
 // @vitest-environment jsdom
+
 import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
@@ -7,6 +8,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { setKnowledge, siteRouter } from "../api/site-requests";
 import { type Site, setSiteRouter, setSites } from "../api/sites";
 import { standInForBrowser } from "../testing/browser";
+import { plain } from "../testing/texts";
 import { ViewLinks } from "./view-links";
 
 standInForBrowser();
@@ -57,7 +59,7 @@ async function shown(run: string): Promise<string> {
     ({ textContent }) => textContent,
   );
   act(() => root.unmount());
-  return text.join(" ").replace(/[\u2066-\u2069]/g, "");
+  return plain(text.join(" "));
 }
 
 test("the links to a run name a site that may have some and gives no usable answer", async () => {

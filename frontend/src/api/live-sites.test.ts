@@ -1,6 +1,6 @@
 /** The live sockets of two sites as one: what is unknown at one hides nothing of the other. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { Wire } from "../testing/wire";
+import { Wire, wireOf } from "../testing/wire";
 import { runnerAt } from "./client";
 import { sessionEnd } from "./http";
 import { SitesJoiner } from "./live-sites";
@@ -23,12 +23,6 @@ const run = (id: string, engine: string, at: number, more: object = {}) => ({
   ...{ requested_at: `2026-11-30T10:00:0${at}Z`, unknown_since: null, desired: "running" },
   ...{ actions: {}, alarms: [], ...more },
 });
-const wireOf = (url: string): Wire => {
-  const wire = Wire.all.findLast((each) => each.url.startsWith(url.replace("http", "ws")));
-  if (wire === undefined) throw new Error(`no socket to ${url}`);
-  return wire;
-};
-
 /** The URLs to which Stops were posted. */
 let posted: string[];
 /** URLs that do not answer. */

@@ -64,7 +64,7 @@ export class SitesJoiner implements Joiner {
     return this.#partOf(siteOfId(run));
   }
 
-  /** What is drawn by it is not drawn anew with each message: a site with the right time has 0. */
+  /** Returns the shift, and the same one until it is off by `STEADY`, so that no message draws anew what it shows; 0 for a site with the right time. */
   #steadyShiftOf(socket: Part["socket"]): number {
     const [before = 0, now] = [this.#shifts.get(socket), shiftOf(socket)];
     if (Math.abs(now - before) < STEADY) return before;

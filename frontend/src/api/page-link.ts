@@ -147,7 +147,7 @@ export const pageLink = new PageLink();
 
 const never = () => () => {};
 
-/** Return the state of the live link. `run`: the id of a run, for the state of its site instead of that of all sites. */
+/** Return the state of the live link. `run`: the id of a run; `now` is then the state of its site, not of all. */
 export function useLive(run?: string): PageLinkState & { now: LiveState } {
   const hold = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   const { live } = hold;

@@ -1,9 +1,11 @@
 /** The sockets of all runners behind one, also without what joins them, and while runners come and go. */
+
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { serverNow } from "../clock/server-clock";
 import { wholeNotice } from "../runs/stop/stop-notice";
 import { progressByAid } from "../status/progress";
-import { Wire } from "../testing/wire";
+import { plain } from "../testing/texts";
+import { Wire, wireOf, wiresOf } from "../testing/wire";
 import { runnerAt } from "./client";
 import { SitesJoiner } from "./live-sites";
 import { type LiveState, openRuns, silentSites } from "./live-socket";
@@ -22,17 +24,9 @@ const run = (id: string, more: object = {}) => ({
   ...{ graph_name: "g", actions: {}, alarms: [], ...more },
 });
 const DORA = { name: "Dora", simulated: false, state: "answering", holds: [] };
-const wiresOf = (url: string) =>
-  Wire.all.filter((each) => each.url.startsWith(url.replace("http", "ws")));
-const wireOf = (url: string): Wire => {
-  const wire = wiresOf(url).at(-1);
-  if (wire === undefined) throw new Error(`no socket to ${url}`);
-  return wire;
-};
 const hello = (url: string, ...runs: object[]) =>
   wireOf(url).say({ type: "hello", engines: [], runs });
-const said = (now: LiveState) =>
-  wholeNotice(now, new Set(), performance.now())?.text.replace(/[\u2066-\u2069]/g, "");
+const said = (now: LiveState) => plain(wholeNotice(now, new Set(), performance.now())?.text);
 
 /** The URLs to which Stops were posted, and the ids of these Stops. */
 let posted: { url: string; id: string }[];

@@ -26,7 +26,7 @@ export async function findUnreachableReason(runner: string): Promise<Unreachable
   if (await refused())
     return {
       kind: "strange",
-      why: `This page was loaded before the runner at ${runner} was named, so the browser lets it not connect there: reload the page.`,
+      why: `This page was loaded before the runner at ${runner} was named, so the browser does not let it connect there: reload the page.`,
     };
   if (answer === null)
     return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
@@ -40,17 +40,20 @@ export async function findUnreachableReason(runner: string): Promise<Unreachable
   };
 }
 
-/** The policy of a page names the runners of the time at which it was loaded. Returns what tells whether it has refused. */
+/**
+ * Watches whether the policy of the page refuses a request: it names the runners of the time at which the page was
+ * loaded. Return a function that ends that and says whether it did.
+ */
 function refusedByPolicy(runner: string): () => Promise<boolean> {
-  let is = false;
+  let isRefused = false;
   const listen = ({ blockedURI }: SecurityPolicyViolationEvent) => {
-    is ||= blockedURI.startsWith(runner);
+    isRefused ||= blockedURI.startsWith(runner);
   };
   globalThis.document?.addEventListener("securitypolicyviolation", listen);
   return async () => {
     await new Promise((done) => setTimeout(done)); // the event may come after the refusal
     globalThis.document?.removeEventListener("securitypolicyviolation", listen);
-    return is;
+    return isRefused;
   };
 }
 

@@ -1,4 +1,5 @@
 // @vitest-environment jsdom
+
 import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
@@ -6,7 +7,8 @@ import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test } from "vitest";
 import { PersonContext } from "../api/people";
 import type { Run } from "../api/runs";
-import { standInForBrowser } from "../testing/browser";
+import { adaAs, standInForBrowser } from "../testing/browser";
+import { plain } from "../testing/texts";
 import { RunPage } from "./run-page";
 
 standInForBrowser();
@@ -43,12 +45,6 @@ const run = {
   umrf: { graph_name: CANARY, actions: [] },
 };
 
-const ada = {
-  person: { id: "a", name: "Ada", role: "viewer" as const },
-  visit: 0,
-  rename: async () => {},
-};
-
 let root: Root;
 let place: HTMLElement;
 
@@ -70,7 +66,7 @@ async function shown(part: object): Promise<{ text: string; buttons: string[]; l
     root.render(
       <MantineProvider>
         <QueryClientProvider client={client}>
-          <PersonContext value={ada}>
+          <PersonContext value={adaAs("viewer")}>
             <RunPage
               id="r"
               bar={({ crumbs, status, actions }) => (
@@ -89,8 +85,6 @@ async function shown(part: object): Promise<{ text: string; buttons: string[]; l
   const links = place.querySelectorAll("a, canvas, [role=tab], input").length;
   return { text: place.innerHTML, buttons, links };
 }
-
-const plain = (text: string) => text.replace(/[\u2066-\u2069]/g, "");
 
 test("of a run that is hidden the page shows robot, state, who started it and Stop", async () => {
   const { text, buttons, links } = await shown({});

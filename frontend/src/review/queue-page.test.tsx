@@ -6,7 +6,7 @@ import { createRoot } from "react-dom/client";
 import { expect, test, vi } from "vitest";
 import { PersonContext } from "../api/people";
 import type { QueueEntry } from "../api/queue";
-import { standInForBrowser } from "../testing/browser";
+import { adaAs, standInForBrowser } from "../testing/browser";
 import { QueuePage } from "./queue-page";
 
 standInForBrowser();
@@ -17,11 +17,6 @@ vi.mock("../api/page-link", () => ({
 
 const OBSTACLE = "What is stored of it cannot be read any more. It can only be removed.";
 const UNREAD = "a start that cannot be read";
-const ada = {
-  person: { id: "a", name: "Ada", role: "owner" as const },
-  visit: 0,
-  rename: async () => {},
-};
 const entry = (part: Partial<QueueEntry>): QueueEntry => ({
   ...{ id: "e", graph: "g", graph_name: "lift", version: "v", digest: "d", engine: "simulator" },
   ...{ robots: [], values: {}, author: { id: "b", name: "Ben" }, by_itself: false },
@@ -40,7 +35,7 @@ async function shown(...entries: QueueEntry[]): Promise<{ text: string; buttons:
     root.render(
       <MantineProvider env="test">
         <QueryClientProvider client={client}>
-          <PersonContext value={ada}>
+          <PersonContext value={adaAs("owner")}>
             <QueuePage bar={() => null} />
           </PersonContext>
         </QueryClientProvider>

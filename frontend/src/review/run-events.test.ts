@@ -1,6 +1,8 @@
 /** Events of a run are listed in an order in which they can have happened. */
+
 import { expect, test } from "vitest";
 import type { Run } from "../api/runs";
+import { plain } from "../testing/texts";
 import { markText } from "./replay-controls";
 import { eventLines } from "./run-events";
 
@@ -111,8 +113,7 @@ test.each([
 
 test("the first line names where a run was started, and a run that only asks people has no robot", () => {
   const run = ran("2026-11-20T09:00:01.100Z", "2026-11-20T09:00:02.000Z");
-  const first = (more: Partial<Run>) =>
-    eventLines({ ...run, ...more }, "v1")[0]?.text.replace(/[\u2066-\u2069]/g, "");
+  const first = (more: Partial<Run>) => plain(eventLines({ ...run, ...more }, "v1")[0]?.text);
   expect(first({})).toBe("Ada started v1 in the simulator");
   expect(first({ engine: "David", simulated: false })).toBe("Ada started v1 on David");
   expect(first({ robots: {} })).toBe("Ada started v1, which only asks people");

@@ -1,4 +1,5 @@
 // @vitest-environment jsdom
+
 import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
@@ -7,7 +8,8 @@ import { afterEach, expect, test, vi } from "vitest";
 import { PersonContext } from "../api/people";
 import { setKnowledge, siteRouter } from "../api/site-requests";
 import { setSiteRouter, setSites } from "../api/sites";
-import { standInForBrowser } from "../testing/browser";
+import { adaAs, standInForBrowser } from "../testing/browser";
+import { plain } from "../testing/texts";
 import "./robot-form"; // so that its part is there at once
 import { RobotsPage } from "./robots-page";
 
@@ -25,11 +27,6 @@ vi.mock("../api/page-link", () => ({
 }));
 
 const FOUND = { actor: "Dora", domain: 42, get_service: "get", generation: "", problem: "" };
-const ada = {
-  person: { id: "a", name: "Ada", role: "operator" as const },
-  visit: 0,
-  rename: async () => {},
-};
 
 afterEach(() => {
   setSiteRouter(undefined);
@@ -54,7 +51,7 @@ test("an engine is registered at the runner that has found it", async () => {
     root.render(
       <MantineProvider env="test">
         <QueryClientProvider client={new QueryClient()}>
-          <PersonContext value={ada}>
+          <PersonContext value={adaAs("operator")}>
             <RobotsPage onImport={() => {}} />
           </PersonContext>
         </QueryClientProvider>
@@ -63,10 +60,7 @@ test("an engine is registered at the runner that has found it", async () => {
   );
   const found = () => document.querySelector("section[aria-label]");
   await vi.waitFor(() => act(async () => expect(found()?.textContent).toContain("Dora")));
-  const label = found()
-    ?.getAttribute("aria-label")
-    ?.replace(/[\u2066-\u2069]/g, "");
-  expect(label).toBe("In sight of Hall B, not registered");
+  expect(plain(found()?.getAttribute("aria-label"))).toBe("In sight of Hall B, not registered");
   await act(async () => found()?.querySelector("button")?.click());
   const site = () => document.querySelector<HTMLSelectElement>("[role=dialog] select");
   await vi.waitFor(() => act(async () => expect(site()?.value).toBe(B.url)));

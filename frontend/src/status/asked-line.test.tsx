@@ -1,8 +1,10 @@
 // @vitest-environment jsdom
+
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { expect, test, vi } from "vitest";
+import { plain } from "../testing/texts";
 import { AskedLine } from "./asked-line";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
@@ -33,7 +35,7 @@ function lineAt(address: string, below: boolean): string | null {
   );
   const label = document.querySelector("a")?.getAttribute("aria-label") ?? null;
   act(() => root.unmount());
-  return label?.replace(/[\u2066-\u2069]/g, "") ?? null;
+  return label === null ? null : plain(label);
 }
 
 test("below the bar of the page of a run, the questions of other runs are shown", () => {

@@ -1,4 +1,5 @@
 // @vitest-environment jsdom
+
 import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
@@ -7,6 +8,7 @@ import { expect, test, vi } from "vitest";
 import { PersonContext } from "../api/people";
 import type { ApprovalWanted } from "../api/starts";
 import { standInForBrowser } from "../testing/browser";
+import { plain } from "../testing/texts";
 import { WantedYes } from "./second-person";
 
 standInForBrowser();
@@ -53,8 +55,8 @@ async function shown(...questions: ApprovalWanted[]): Promise<{ texts: string[];
     await vi.waitFor(() => expect(all("section")).toHaveLength(questions.length));
     await vi.waitFor(() => expect(all("button")).toHaveLength(inSight.length));
   });
-  const plain = (each: Element) => (each.textContent ?? "").replace(/[\u2066-\u2069]/g, "");
-  const found = { texts: all("section").map(plain), says: all("button").map(plain) };
+  const textsOf = (name: string) => all(name).map(({ textContent }) => plain(textContent));
+  const found = { texts: textsOf("section"), says: textsOf("button") };
   act(() => root.unmount());
   return found;
 }

@@ -1,9 +1,11 @@
 // @vitest-environment jsdom
+
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { expect, test, vi } from "vitest";
 import { QueuePage } from "../review/queue-page";
+import { plain } from "../testing/texts";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 const mocked = vi.hoisted(() => ({ link: "live" }));
@@ -37,7 +39,7 @@ function said(): string {
   );
   const text = document.body.textContent ?? "";
   act(() => root.unmount());
-  return text.replace(/[\u2066-\u2069]/g, "");
+  return plain(text);
 }
 
 test("a queue of which one site says nothing is not called empty", () => {

@@ -1,5 +1,7 @@
 /** Stand-ins for parts of a browser that jsdom lacks, and for the server at the other end of its sockets. */
 import { vi } from "vitest";
+import type { SignedIn } from "../api/people";
+import type { Role } from "../api/session";
 import type { FakeServer } from "./fake-server";
 
 /** Let React and Mantine find what they ask of a browser. Call it where a test file is read. */
@@ -25,3 +27,10 @@ export function answerSockets(server: () => FakeServer): void {
   }
   vi.stubGlobal("WebSocket", answered);
 }
+
+/** Return Ada, signed in with this role. */
+export const adaAs = (role: Role): SignedIn => ({
+  person: { id: "a", name: "Ada", role },
+  visit: 0,
+  rename: async () => {},
+});

@@ -23,3 +23,14 @@ export class Wire {
     this.onmessage?.({ data: JSON.stringify(message) });
   }
 }
+
+/** Return all sockets to a runner, the oldest first. */
+export const wiresOf = (url: string): Wire[] =>
+  Wire.all.filter((each) => each.url.startsWith(url.replace("http", "ws")));
+
+/** Return the newest socket to a runner. */
+export function wireOf(url: string): Wire {
+  const wire = wiresOf(url).at(-1);
+  if (wire === undefined) throw new Error(`no socket to ${url}`);
+  return wire;
+}

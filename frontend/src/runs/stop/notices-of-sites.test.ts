@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { LiveState, SiteState, StopRequest } from "../../api/live-socket";
 import type { Run } from "../../api/runs";
+import { plain } from "../../testing/texts";
 import { headOf, noticeKey, noticeOf, wholeNotice } from "./stop-notice";
 
 const NONE: ReadonlySet<string> = new Set();
@@ -19,7 +20,6 @@ const withRun = (state: LiveState, part: object): LiveState => {
 const named = (name: string, state: LiveState): SiteState => ({ site: { name, url: name }, state });
 const whole = (sites: readonly SiteState[], at = 2_000) =>
   wholeNotice({ ...live("live"), sites }, NONE, at);
-const plain = (text: string | undefined) => text?.replace(/[\u2066-\u2069]/g, "");
 
 const ENDED = { state: "stopped", ended_at: "1970-01-01T00:00:01Z" };
 const UNCONFIRMED = { desired: "stopped", unconfirmed: "no proof" };
@@ -74,7 +74,7 @@ test("a site that has said nothing yet is not said to run nothing", () => {
 /** Which of two sites are said to refuse the same Stop. */
 function refusing(a: StopRequest, b: StopRequest): string[] {
   const sites = [named("A", live("live", a)), named("B", live("live", b))];
-  const said = plain(whole(sites)?.text) ?? "";
+  const said = plain(whole(sites)?.text);
   return ["A", "B"].filter((name) => said.includes(`Stop refused at ${name}:`));
 }
 
