@@ -2,6 +2,7 @@
 `make containers` runs them."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -158,6 +159,53 @@ def test_doctor_looks_for_robots_where_the_image_has_ros(
         assert told.stdout == f"{said}\n"
 
 
+def test_editors_of_one_folder_take_an_address_each(tmp_path: Path) -> None:
+    (tmp_path / "program").write_text('#!/bin/sh\necho "$@"\nread -r _\n')
+    (tmp_path / "program").chmod(0o755)
+    script = (ROOT / "scripts" / "image").read_text()
+    script = script.replace("/opt/action-assistant/bin/action-assistant", str(tmp_path / "program"))
+    (tmp_path / "image").write_text(script.replace("/tmp/editor-", f"{tmp_path}/editor-"))
+    env = {**os.environ, "EDITORS": "2", "ACTION_ASSISTANT_DATA": str(tmp_path)}
+
+    def begin() -> "subprocess.Popen[str]":
+        pipe = subprocess.PIPE
+        words = ["sh", str(tmp_path / "image"), "run", "editor", "--no-open"]
+        return subprocess.Popen(words, env=env, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
+
+    def said(editor: "subprocess.Popen[str]") -> str:
+        assert editor.stdout is not None
+        return editor.stdout.readline()
+
+    words = "editor --host 127.0.0.{0} --cluster-listen 127.0.0.{0}:8400 --no-open\n"
+    with begin() as one, begin() as two:
+        assert {said(one), said(two)} == {words.format(1), words.format(2)}
+        with begin() as third:
+            assert third.communicate()[1].startswith("image: 2 editors run already")
+            assert third.returncode == 1
+        one.kill()
+        one.wait()
+        with begin() as again:
+            assert said(again) in {words.format(1), words.format(2)}
+            again.kill()
+        two.kill()
+    assert (tmp_path / "editor-address").read_text() in {"127.0.0.1\n", "127.0.0.2\n"}
+
+
+@pytest.mark.parametrize(
+    ("editors", "told"),
+    [("1", " 127.0.0.1:8000 | 0\n"), ("3", " 127.0.0.1:8000 127.0.0.2:8000 127.0.0.3:8000 | 2s\n")],
+)
+def test_the_proxy_knows_all_editors(editors: str, told: str) -> None:
+    command = SERVICES["proxy"]["command"][-1].replace("$$", "$")
+    command = re.sub(r"exec caddy .*", 'echo "$EDITOR_ADDRESSES | $PATIENCE"', command)
+    env = SERVICES["proxy"]["environment"]
+    env = env | {"PUBLIC_URL": "https://lab.local", "EDITORS": editors, "EDITOR_PORT": "8000"}
+    answer = subprocess.run(
+        ["sh", "-c", command], env=env, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == told
+
+
 #: Stands in for the Python of the help's stage: it imports what builds the help, and says what that took.
 _IMPORTS = """
 import json, sys
@@ -253,7 +301,7 @@ def test_every_setting_reaches_every_container_of_ours(name: str) -> None:
     required ones."""
     service = SERVICES[name]
     assert service["env_file"] == [{"path": ".env", "required": False}]
-    said = set(service.get("environment", {}))
+    said = set(service.get("environment", {})) - {"EDITORS"}  # read before the program begins
     assert said <= set(VARIABLES)
     alone = {"PORT", "SHARE", "HOSTS", "DATABASE_FILE"} if name == "simulator" else set()
     kept = {"DATA", "DATABASE"} if name != "robot" else set()
@@ -281,7 +329,8 @@ def test_editor_runner_and_proxy_are_on_one_network() -> None:
     """Else none of them is where its links, proofs and commands say (decision 75)."""
     for name in ("editor", "runner", "proxy"):
         assert SERVICES[name]["network_mode"] == "host"
-    assert SERVICES["editor"]["environment"] == SERVICES["runner"]["environment"]
+    also = {"EDITORS": SERVICES["editor"]["scale"]}
+    assert SERVICES["editor"]["environment"] == SERVICES["runner"]["environment"] | also
 
 
 def test_the_simulator_alone_needs_no_robots_and_no_postgres_and_keeps_its_data_apart() -> None:

@@ -62,22 +62,22 @@ class Stack:
                 if service not in _WITHOUT_HEALTH_CHECK:
                     self.wait(service)
 
-    def wait(self, service: str) -> None:
+    def wait(self, service: str, number: int = 1) -> None:
         """Wait until the health check of a service succeeds."""
         deadline = time.monotonic() + _PATIENCE_S
-        while not self.is_healthy(service):
+        while not self.is_healthy(service, number):
             if time.monotonic() > deadline:
                 raise AssertionError(f"{service} is not healthy:\n{self.log(service)}")
             time.sleep(0.5)
 
-    def is_healthy(self, service: str) -> bool:
+    def is_healthy(self, service: str, number: int = 1) -> bool:
         """Run the health check of a service, and return whether it succeeds."""
-        name = self.container(service)
+        name = self.container(service, number)
         return run("podman", "healthcheck", "run", name, check=False).returncode == 0
 
-    def container(self, service: str) -> str:
-        """Its name."""
-        return f"{PROJECT}_{service}_1"
+    def container(self, service: str, number: int = 1) -> str:
+        """Its name. `number`: which of several, from 1."""
+        return f"{PROJECT}_{service}_{number}"
 
     def execute(self, service: str, *words: str) -> "subprocess.CompletedProcess[str]":
         """`docker compose exec SERVICE …`, whatever it answers."""
