@@ -19,6 +19,7 @@ from journal.servers import Server
 from support.product import free_ports
 from support.provider import CLIENT, SECRET, provided
 from support.proxy import EDITORS, NGINX, nginx
+from web.auth.test_passkeys import Authenticator
 
 pytestmark = pytest.mark.skipif(not NGINX, reason="nginx is not installed")
 
@@ -134,6 +135,7 @@ async def test_what_begins_at_one_editor_while_somebody_signs_in_ends_at_another
                 for _ in range(3):
                     await adds_a_device(ada, [await browser() for _ in range(6)])
                 await lets_a_program_in(ada, [await browser() for _ in range(6)])
+                await registers_a_passkey(ada)
                 guesses = [await ada.post("/api/logins/look", code=f"BBBB{n}") for n in range(25)]
                 assert {each.status_code for each in guesses} == {404, 429}
 
@@ -157,11 +159,11 @@ class Asking:
 
     def __init__(self, page: httpx.AsyncClient, origin: str) -> None:
         self.page = page
-        self._origin = origin
+        self.origin = origin
 
     async def post(self, path: str, **body: Any) -> httpx.Response:
         """Send a request, and return the answer."""
-        return await self.page.post(path, json=body, headers={"origin": self._origin})
+        return await self.page.post(path, json=body, headers={"origin": self.origin})
 
     async def ask(self, path: str, **body: Any) -> Any:
         """Return what is answered to a request, which must not be refused."""
@@ -198,3 +200,12 @@ async def lets_a_program_in(ada: Asking, others: list[Asking]) -> None:
     asked = [each.ask("/api/logins/claim", secret=begun["secret"]) for each in others]
     states = sorted(each["state"] for each in await asyncio.gather(*asked))
     assert states == ["gone", "gone", "gone", "gone", "gone", "granted"]
+
+
+async def registers_a_passkey(ada: Asking) -> None:
+    """Let Ada register a passkey by three requests at once: a challenge counts once."""
+    options = (await ada.ask("/api/passkeys/challenge"))["options"]
+    made = Authenticator().create(options, ada.origin)
+    sent = [ada.post("/api/passkeys", name="Key", credential=made) for _ in range(3)]
+    statuses = sorted(each.status_code for each in await asyncio.gather(*sent))
+    assert statuses == [201, 403, 403]

@@ -44,9 +44,9 @@ _GOODBYE_S: Final = 1.0
 #: Methods that change nothing, so that they may be relayed once more where the answer was lost.
 _SAFE: Final = frozenset({"GET", "HEAD"})
 _LEFT_AS_IS: Final = "%/:?@!$&'()*+,;=~-._"  # of a path or query, beside letters and digits
-_SILENT: Final = "The editor that has this graph open does not answer; try again."
+_SILENT: Final = "The editor that has this open does not answer; try again."
 _UNREADABLE: Final = "The answer of another editor cannot be read."
-_LOST: Final = "The editor that had this graph open has ended, and may have done it before that."
+_LOST: Final = "The editor that had this open has ended, and may have done it before that."
 
 
 class _Unreached(Exception):

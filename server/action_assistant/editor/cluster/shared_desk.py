@@ -75,10 +75,9 @@ class SharedDesk(Desk):
         """Answer a call of another editor, whose seal was verified. Raise what the method raises."""
         name, _, method = path.removeprefix(CALLS).partition("/")
         held = self._held.get(name)
-        function = None if held is None else getattr(held.store, method, None)
+        function = None if held is None else getattr(type(held.store), method, None)
         if held is None or function is None or method.startswith("_"):
             raise NotFound(f"Nothing is called {path}.")
-        function = getattr(type(held.store), method)
         nonce = body[:_NONCE]
         given = msgspec.json.decode(self._cipher.decrypt(nonce, body[_NONCE:], path.encode()))
         hints = get_type_hints(function)
