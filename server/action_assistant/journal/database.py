@@ -28,8 +28,8 @@ def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
 class Overtaken(Exception):
     """Another process has written to this database, so what this one knows of its streams is old.
     `streams`: those of the statement that was refused; at least one of them has moved. Or another
-    event has the position of one of their events (`by_position`), which only the writer of the same slot
-    could have stored."""
+    event has the position of one of their events (`by_position`), which only the writer of the same
+    slot could have stored."""
 
     def __init__(self, streams: Iterable[str], *, by_position: bool = False) -> None:
         self.streams: Final = tuple(streams)
@@ -50,8 +50,8 @@ class WriterSession(Protocol):
 
     @property
     def is_shared(self) -> bool:
-        """Return whether other processes may write to this database at the same time, so that streams may
-        have moved on; `store` compares their epochs then."""
+        """Return whether other processes may write to this database at the same time, so that
+        streams may have moved on; `store` compares their epochs then."""
 
     def run(self, work: Callable[[], T]) -> T:
         """Call `work`, which uses this session, in the way that the database needs, and return its
@@ -74,13 +74,13 @@ class WriterSession(Protocol):
     ) -> None:
         """Write events, each with its link of the hash chain, and the new ends of their streams:
         all or nothing. If no transaction is open, this is one of its own, which is committed.
-        `known`: the ends of their streams in the database, as the writer knows them; `epochs`: those
-        of streams in a shared database. Raise Overtaken if another process has moved one of them or
-        has taken it; nothing is written then."""
+        `known`: the ends of their streams in the database, as the writer knows them; `epochs`:
+        those of streams in a shared database. Raise Overtaken if another process has moved one of
+        them or has taken it; nothing is written then."""
 
     def hold(self, streams: Sequence[str]) -> None:
-        """Lock these streams in the open transaction: no other process appends to them until it ends. A
-        database with only one writer needs no such lock, and does nothing."""
+        """Lock these streams in the open transaction: no other process appends to them until it
+        ends. A database with only one writer needs no such lock, and does nothing."""
 
     def abandon(self) -> None:
         """Roll the transaction back that is open, if there is one."""
@@ -118,8 +118,9 @@ class Database(Protocol):
         self, branch: Branch, before: Before = no_copy, *, upgrades: bool = True
     ) -> WriterSession:
         """Take the lock of the only writer, bring the tables of the branch to this version, and
-        connect. `before` is called if tables are about to change; without `upgrades` they stay as they
-        are. Raise CannotStart if the database cannot be used or another process holds the lock."""
+        connect. `before` is called if tables are about to change; without `upgrades` they stay as
+        they are. Raise CannotStart if the database cannot be used or another process holds the
+        lock."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Call `question` with a connection to the existing database; create and change nothing.
@@ -138,8 +139,8 @@ class Database(Protocol):
         not of the statement."""
 
     def raced(self, error: Exception) -> bool:
-        """Return whether a statement failed only because another process wrote at the same time, so that
-        it may be tried again in a new transaction."""
+        """Return whether a statement failed only because another process wrote at the same time, so
+        that it may be tried again in a new transaction."""
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Call `question` with a connection that reads, and return its result; it does not wait for
@@ -150,8 +151,8 @@ class Database(Protocol):
         and return its result. Nothing is changed, not even the tables of an older version."""
 
     def slots(self, connection: Connection) -> list[int]:
-        """Return the slots whose events `scan` returns one slot after the other; one slot stands for a log
-        that `scan` returns in its own order."""
+        """Return the slots whose events `scan` returns one slot after the other; one slot stands
+        for a log that `scan` returns in its own order."""
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Return a page of stored events, unchecked and with their links of the hash chain, after

@@ -1,8 +1,9 @@
-"""Servers of Postgres that take over from each other, and what proves that a failover loses nothing.
+"""Servers of Postgres that take over from each other, and what proves that a failover loses
+nothing.
 
-A commit is confirmed when the replica that would take over has it too (decision 168). The URL of the
-database says who takes over: several `host`s, `patroni=http://db1:8008` for each node of Patroni, or
-`failover=synchronous` for another manager behind one address.
+A commit is confirmed when the replica that would take over has it too (decision 168). The URL of
+the database says who takes over: several `host`s, `patroni=http://db1:8008` for each node of
+Patroni, or `failover=synchronous` for another manager behind one address.
 """
 
 import asyncio
@@ -42,8 +43,9 @@ class NoPrimary(OSError):
 
 
 class Primary(NamedTuple):
-    """The facts that a primary tells about itself. `standbys`: its setting `synchronous_standby_names`;
-    `identifier`: of its cluster; `timeline`: rises with each server that takes over."""
+    """The facts that a primary tells about itself. `standbys`: its setting
+    `synchronous_standby_names`; `identifier`: of its cluster; `timeline`: rises with each server
+    that takes over."""
 
     standbys: str
     identifier: str
@@ -58,16 +60,17 @@ class _Identity(NamedTuple):
 
 
 class Failover:
-    """The way in which one server of a database takes over from another. `patroni`: the addresses of
-    Patroni; without any, another manager promotes only a server that has every confirmed commit."""
+    """The way in which one server of a database takes over from another. `patroni`: the addresses
+    of Patroni; without any, another manager promotes only a server that has every confirmed
+    commit."""
 
     def __init__(self, patroni: tuple[str, ...]) -> None:
         self.patroni: Final = patroni
         self._newest: dict[str, int] = {}  # timeline, by the identifier of a cluster
 
     def note(self, identifier: str, timeline: int) -> None:
-        """Remember that a server of this cluster has begun this timeline: a server on an earlier one is an old
-        primary that lives on."""
+        """Remember that a server of this cluster has begun this timeline: a server on an earlier
+        one is an old primary that lives on."""
         self._newest[identifier] = max(timeline, self._newest.get(identifier, 0))
 
     def is_old(self, identifier: str, timeline: int) -> bool:
@@ -75,8 +78,8 @@ class Failover:
         return timeline < self._newest.get(identifier, 0)
 
     async def weakness(self, primary: Primary) -> str:
-        """Return why what this primary confirms could be lost, as a sentence without a full stop; ""
-        if it cannot."""
+        """Return why what this primary confirms could be lost, as a sentence without a full stop;
+        "" if it cannot."""
         if self.patroni and (said := await self.said(primary)) is not None:
             return said
         # A primary that its Patroni led into synchronous mode names a replica, and waits for it.
@@ -87,8 +90,8 @@ class Failover:
         return "a failover could lose what it confirms (synchronous_standby_names is empty)"
 
     async def said(self, primary: Primary) -> str | None:
-        """Return why Patroni says that commits on this primary could be lost; "" if it does not say so, None
-        if no Patroni answers."""
+        """Return why Patroni says that commits on this primary could be lost; "" if it does not say
+        so, None if no Patroni answers."""
         answers = await asyncio.gather(*(_asked(each) for each in self.patroni))
         ours = [each for each in answers if each is not None]
         if not ours:
@@ -106,8 +109,8 @@ class Failover:
 
 
 class Watch:
-    """Asks Patroni, if there is one, about the primary of one connection, every few seconds, on a thread
-    of its own, so that no commit waits for the answer."""
+    """Asks Patroni, if there is one, about the primary of one connection, every few seconds, on a
+    thread of its own, so that no commit waits for the answer."""
 
     def __init__(self, failover: Failover, primary: Primary) -> None:
         self._failover: Final = failover
@@ -159,8 +162,8 @@ def engine_of(
     url: URL, arguments: Mapping[str, Any], failover: Failover | None = None, **options: Any
 ) -> AsyncEngine:
     """Return an engine that connects to the primary among the hosts of a URL. `arguments`: those of
-    each connection; `failover`: knows which primaries are old; `options`: those of the engine, whose pool
-    hands out no connection to an old primary."""
+    each connection; `failover`: knows which primaries are old; `options`: those of the engine,
+    whose pool hands out no connection to an old primary."""
     url = url.set(drivername="postgresql+asyncpg")
     if len(hosts_of(url)) < 2:
         return create_async_engine(url, connect_args=dict(arguments), **options)
@@ -180,7 +183,8 @@ def engine_of(
 
     @listens_for(engine.sync_engine.pool, "checkout")
     def check(adapted: Any, record: ConnectionPoolEntry, __: object) -> None:
-        """Refuse a connection to an old primary before it is asked anything: that one may be frozen."""
+        """Refuse a connection to an old primary before it is asked anything: that one may be
+        frozen."""
         identity = found.get(record.driver_connection)
         if failover is not None and identity is not None and failover.is_old(*identity):
             raise DisconnectionError
@@ -197,8 +201,8 @@ async def _connected_to_primary(
     servers: Iterable[Mapping[str, Any]], failover: Failover | None
 ) -> tuple[Any, _Identity]:
     """Connect to all servers at once, and return the connection to the primary: a server that is
-    silent must not use up the time of the others. Of two, an old primary that lives on has the lower
-    timeline; one of which it is known is not waited with, and not taken."""
+    silent must not use up the time of the others. Of two, an old primary that lives on has the
+    lower timeline; one of which it is known is not waited with, and not taken."""
     waiting = {asyncio.ensure_future(_identified(each)): _place(each) for each in servers}
     primaries: dict[Any, _Identity] = {}
     chosen: Any = None

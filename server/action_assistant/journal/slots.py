@@ -1,8 +1,9 @@
 """Slots: ranges of positions, one for each writer of a log (decision 173).
 
-A position is `slot * 2**46 + n`; in its slot n counts from 1 without gaps. The only writer of a log has slot 0,
-so n is the whole position there. Positions of different slots do not say which event came first: only the order
-within a stream counts, and `LogOrder` finds an order of all events that keeps it.
+A position is `slot * 2**46 + n`; in its slot n counts from 1 without gaps. The only writer of a log
+has slot 0, so n is the whole position there. Positions of different slots do not say which event
+came first: only the order within a stream counts, and `LogOrder` finds an order of all events that
+keeps it.
 """
 
 from collections import deque
@@ -39,16 +40,16 @@ def before_first(slot: int) -> int:
 
 
 def newest_in(position: Column[int], slot: int) -> Select[Any]:
-    """Return a query for the newest position in a slot, by the column `position`. If the slot has no
-    events, that is `before_first` of it."""
+    """Return a query for the newest position in a slot, by the column `position`. If the slot has
+    no events, that is `before_first` of it."""
     begin = before_first(slot)
     newest = func.coalesce(func.max(position), begin)
     return select(newest).where(position > begin, position < before_first(slot + 1))
 
 
 def ends_of_slots(connection: Connection, position: Column[int]) -> list[int]:
-    """Return the newest position in each slot that has events, the lowest slot first. The table is that of
-    the column `position`."""
+    """Return the newest position in each slot that has events, the lowest slot first. The table is
+    that of the column `position`."""
     ends: list[int] = []
     end = connection.execute(select(func.max(position))).scalar()
     while end is not None:
@@ -61,8 +62,8 @@ def ends_of_slots(connection: Connection, position: Column[int]) -> list[int]:
 
 
 class Cursor(msgspec.Struct, frozen=True):
-    """A moment of a log: the number of the last event that was seen, for each slot from 0 on. Its text is
-    these numbers with dots between, without zeros at the end: `512` or `512.0.7`."""
+    """A moment of a log: the number of the last event that was seen, for each slot from 0 on. Its
+    text is these numbers with dots between, without zeros at the end: `512` or `512.0.7`."""
 
     numbers: tuple[int, ...] = ()
 
@@ -139,8 +140,8 @@ def cursor_of(connection: Connection, position: Column[int]) -> Cursor:
 def order_in_time(
     connection: Connection, position: Column[int], at: Column[int], seq: Column[int]
 ) -> tuple[Column[int], ...]:
-    """Return the columns by which events of several streams are sorted, the oldest first: the position in
-    a log of one writer; else the time by the clocks of its writers, then `seq`."""
+    """Return the columns by which events of several streams are sorted, the oldest first: the
+    position in a log of one writer; else the time by the clocks of its writers, then `seq`."""
     newest = connection.execute(select(func.max(position))).scalar() or 0
     return (position,) if slot_of(newest) == 0 else (at, seq, position)
 
@@ -160,14 +161,14 @@ def _trimmed(numbers: list[int]) -> tuple[int, ...]:
 
 
 class LogOrder:
-    """Puts the stored events of several slots into one order that keeps the order of each slot and each
-    stream. An event that removes a stream comes after the remaining events of that stream. Where that
-    leaves a choice, the older event comes first. If events are missing there is no such order; all are
-    returned nevertheless.
+    """Puts the stored events of several slots into one order that keeps the order of each slot and
+    each stream. An event that removes a stream comes after the remaining events of that stream.
+    Where that leaves a choice, the older event comes first. If events are missing there is no such
+    order; all are returned nevertheless.
 
     `removed`: returns which stream an event removes from the log, and its last seq; None for other
-    events. `seen`: the last seq of each stream before the first rows, 0 where it is missing. Rows have
-    the columns of an event in its order, and may have more.
+    events. `seen`: the last seq of each stream before the first rows, 0 where it is missing. Rows
+    have the columns of an event in its order, and may have more.
     """
 
     def __init__(
@@ -188,7 +189,8 @@ class LogOrder:
 
     @property
     def needed(self) -> int | None:
-        """Return a slot whose next rows have to be added before more can be taken; None if there is none."""
+        """Return a slot whose next rows have to be added before more can be taken; None if there is
+        none."""
         return next((slot for slot, rows in self._waiting.items() if not rows), None)
 
     def add(self, slot: int, rows: Sequence[Sequence[Any]]) -> None:
@@ -227,9 +229,9 @@ def pages_in_order(
     limit: int,
     removed: Callable[[Sequence[Any]], tuple[str, int] | None],
 ) -> Iterator[list[Any]]:
-    """Yield the rows of all slots in the order of `LogOrder`, page by page. `chosen`: the query for all
-    events, with the columns of an event in its order; `position`: their column of that name; `limit`: how
-    many rows of a slot are read at once; `removed`: as for `LogOrder`."""
+    """Yield the rows of all slots in the order of `LogOrder`, page by page. `chosen`: the query for
+    all events, with the columns of an event in its order; `position`: their column of that name;
+    `limit`: how many rows of a slot are read at once; `removed`: as for `LogOrder`."""
     ends = {slot_of(end): end for end in ends_of_slots(connection, position)}
     after = {slot: before_first(slot) for slot in ends}
     order = LogOrder(list(ends), removed)

@@ -1,4 +1,5 @@
-"""The entrance for what other editors relay: a listener of its own, never the public port (decision 175)."""
+"""The entrance for what other editors relay: a listener of its own, never the public port
+(decision 175)."""
 
 import hashlib
 from collections.abc import Callable
@@ -54,9 +55,9 @@ class Admitted(Protocol):
 
 
 class Entrance:
-    """An ASGI application that takes what other editors have sealed, for graphs that this editor owns, and
-    nothing else. It relays nothing on: what this editor does not own is refused with 421. `url`: where the others
-    find it."""
+    """An ASGI application that takes what other editors have sealed, for graphs that this editor
+    owns, and nothing else. It relays nothing on: what this editor does not own is refused with 421.
+    `url`: where the others find it."""
 
     def __init__(
         self,
@@ -153,7 +154,8 @@ class Entrance:
     async def _turn(
         self, stream: str, method: str, send: Send, facts: RelayedFacts, turn: str, body: bytes
     ) -> None:
-        """Begin a turn in a room for an author (GET), store its edit (POST), or end it without one (DELETE)."""
+        """Begin a turn in a room for an author (GET), store its edit (POST), or end it without one
+        (DELETE)."""
         if method == "GET":
             with acting_for(turn, _origin(facts, turn)):
                 made, (seq, state) = await self._turns.begin(stream, turn)
@@ -167,8 +169,8 @@ class Entrance:
             await answer(send, 204, [], b"")
 
     async def _verified(self, scope: Any, receive: Receive) -> tuple[RelayedFacts, bytes]:
-        """Return who asks, and the body. Raise Unauthenticated, before the body is read, for what no editor has
-        sealed."""
+        """Return who asks, and the body. Raise Unauthenticated, before the body is read, for what
+        no editor has sealed."""
         headers = {
             name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]
         }
@@ -182,7 +184,8 @@ class Entrance:
 
 
 def _inner_stream(path: str) -> str | None:
-    """Return the stream to whose owner a request of an editor itself belongs; None for unknown paths."""
+    """Return the stream to whose owner a request of an editor itself belongs; None for unknown
+    paths."""
     if path.startswith(CALLS):
         return SIGN_IN
     return path.removeprefix(ROOMS) if path.startswith(ROOMS) else None

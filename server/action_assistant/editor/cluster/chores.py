@@ -20,8 +20,8 @@ _LOOK_S: Final = 2.0
 async def done_by_one(
     owners: Owners, doing: Callable[[], AbstractAsyncContextManager[None]]
 ) -> AsyncIterator[None]:
-    """Return a context during which this editor does the chores while it is their owner. `doing`: returns
-    a context in which they are done."""
+    """Return a context during which this editor does the chores while it is their owner. `doing`:
+    returns a context in which they are done."""
 
     async def take_turns() -> None:
         while True:

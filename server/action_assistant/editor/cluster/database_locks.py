@@ -16,15 +16,16 @@ _LOCK: Final = text("SELECT pg_advisory_xact_lock(hashtextextended(:work, 46))")
 
 
 class DatabaseLocks:
-    """Locks in the Postgres database with the URL `database`. A lock is released when its process ends."""
+    """Locks in the Postgres database with the URL `database`. A lock is released when its process
+    ends."""
 
     def __init__(self, database: str) -> None:
         self._engine = beside(database, "locks", size=_AT_ONCE, patience=_PATIENCE_S)
 
     @asynccontextmanager
     async def exclusively(self, work: str) -> AsyncIterator[None]:
-        """Return a context in which no other editor does this work. Raise Unavailable if the database
-        does not answer, or others take too long."""
+        """Return a context in which no other editor does this work. Raise Unavailable if the
+        database does not answer, or others take too long."""
         connection = self._engine.connect()
         try:
             await connection.start()

@@ -1,4 +1,5 @@
-"""Reads people and rules again after other editors changed them: each editor keeps a copy in memory."""
+"""Reads people and rules again after other editors changed them: each editor keeps a copy in
+memory."""
 
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -25,8 +26,9 @@ _OF_RULES: Final = (h.RULED, h.FILED)
 
 
 class OthersChanges:
-    """Polls the log twice a second for changes by other editors. Calls `people` after changes of persons
-    and links, `rules` after changes of folders and rules, and then `also`, whatever has changed."""
+    """Polls the log twice a second for changes by other editors. Calls `people` after changes of
+    persons and links, `rules` after changes of folders and rules, and then `also`, whatever has
+    changed."""
 
     def __init__(self, journal: Journal, people: Refresh, rules: Refresh, also: Refresh) -> None:
         self._journal = journal

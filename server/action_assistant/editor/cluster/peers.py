@@ -1,4 +1,5 @@
-"""The client for other editors: relays requests and sockets to the owner of their stream (decision 175)."""
+"""The client for other editors: relays requests and sockets to the owner of their stream
+(decision 175)."""
 
 import asyncio
 import logging
@@ -58,8 +59,8 @@ class _AnswerLost(Exception):
 
 
 class Call(NamedTuple):
-    """A request to relay. `target`: its path and query as they came in; `headers`: those that are relayed;
-    `is_inner`: the server itself asks a room."""
+    """A request to relay. `target`: its path and query as they came in; `headers`: those that are
+    relayed; `is_inner`: the server itself asks a room."""
 
     method: str
     target: str
@@ -93,9 +94,9 @@ class Peers:
 
     @asynccontextmanager
     async def answer(self, stream: str, call: Call) -> AsyncIterator[httpx.Response | None]:
-        """Return a context with the answer of the owner of a stream, whose body was not read yet; None if
-        no other editor owns it by now. Raise Unavailable if no owner answers, OutcomeUnknown if the owner
-        may have done what was asked."""
+        """Return a context with the answer of the owner of a stream, whose body was not read yet;
+        None if no other editor owns it by now. Raise Unavailable if no owner answers,
+        OutcomeUnknown if the owner may have done what was asked."""
         answer = await self._tried(
             stream, lambda owner: self._send(stream, owner, call), call.method
         )
@@ -106,8 +107,8 @@ class Peers:
                 await answer.aclose()
 
     async def socket(self, stream: str, call: Call) -> "OpenSocket | Refusal | None":
-        """Open a WebSocket at the owner of a stream, and return it, or the owner's refusal; None if no
-        other editor owns it by now. Raise Unavailable if no owner answers."""
+        """Open a WebSocket at the owner of a stream, and return it, or the owner's refusal; None if
+        no other editor owns it by now. Raise Unavailable if no owner answers."""
         return await self._tried(stream, lambda owner: self._connect(stream, owner, call), "GET")
 
     async def is_owner(self, stream: str, url: str) -> bool:
@@ -202,8 +203,8 @@ class Peers:
 
 
 def _require_taken(status: int, challenge: str) -> None:
-    """Raise _Unreached if the status of an answer says that nothing was done: the other editor does not own
-    the stream, or does not accept the seal."""
+    """Raise _Unreached if the status of an answer says that nothing was done: the other editor does
+    not own the stream, or does not accept the seal."""
     if status == MISDIRECTED:
         raise _Unreached("it does not own it")
     if status == 401 and challenge == SCHEME:

@@ -1,7 +1,7 @@
 """Sends requests and sockets of a graph to the editor that owns it (decision 175).
 
-It stands behind the access control, so the identity of the client is known and is relayed too. Requests that
-another editor has relayed do not pass here, so nothing is relayed twice.
+It stands behind the access control, so the identity of the client is known and is relayed too.
+Requests that another editor has relayed do not pass here, so nothing is relayed twice.
 """
 
 import asyncio
@@ -43,8 +43,8 @@ _OWN: Final = frozenset(
 
 def stream_of(path: str) -> str | None:
     """Return the stream to whose owner a request for this path belongs; None for paths that every
-    editor answers itself. Those with `.` or `..` are such: no route has one, and a client that sends them
-    on resolves them to another path."""
+    editor answers itself. Those with `.` or `..` are such: no route has one, and a client that
+    sends them on resolves them to another path."""
     if not {".", ".."}.isdisjoint(path.split("/")):
         return None
     found = _OF_A_GRAPH.fullmatch(path)
@@ -52,8 +52,8 @@ def stream_of(path: str) -> str | None:
 
 
 class Relay:
-    """An ASGI middleware that relays requests about graphs of other editors, and passes all others to
-    `app`. `owned` says who owns a stream."""
+    """An ASGI middleware that relays requests about graphs of other editors, and passes all others
+    to `app`. `owned` says who owns a stream."""
 
     def __init__(self, app: ASGIApp, owned: Owned, peers: Callable[[], Peers]) -> None:
         self._app = app
@@ -161,8 +161,8 @@ async def _disconnected(receive: Receive) -> None:
 
 
 async def _pass_answer(answer: httpx.Response, send: Send) -> None:
-    """Send the answer of another editor to the client. If it ends early, the connection of the client ends,
-    as it would at the other editor."""
+    """Send the answer of another editor to the client. If it ends early, the connection of the
+    client ends, as it would at the other editor."""
     start: Any = {
         "type": "http.response.start",
         "status": answer.status_code,

@@ -2,13 +2,13 @@
 
 A relayed request has three header fields:
 
-- `X-Relayed`: who asks and from where, as the editor at which the request came in has verified it. A JSON object
-  (`RelayedFacts`) in base64url.
+- `X-Relayed`: who asks and from where, as the editor at which the request came in has verified it.
+  A JSON object (`RelayedFacts`) in base64url.
 - `X-Relayed-Body`: the SHA-256 of the body, as 64 hexadecimal digits.
-- `Authorization: Relay TIME/NONCE/MAC`. TIME: when it was sealed, in seconds since 1970 with three decimals. NONCE:
-  16 random bytes, as 32 hexadecimal digits. MAC: an HMAC-SHA256, as 64 hexadecimal digits, under a key that
-  follows from the server's token, over these texts with a zero byte between: method, URL at the editor that is
-  asked, X-Relayed-Body, X-Relayed, TIME, NONCE.
+- `Authorization: Relay TIME/NONCE/MAC`. TIME: when it was sealed, in seconds since 1970 with three
+  decimals. NONCE: 16 random bytes, as 32 hexadecimal digits. MAC: an HMAC-SHA256, as 64 hexadecimal
+  digits, under a key that follows from the server's token, over these texts with a zero byte
+  between: method, URL at the editor that is asked, X-Relayed-Body, X-Relayed, TIME, NONCE.
 
 A seal counts once, and for 30 seconds before and after its TIME.
 """
@@ -36,10 +36,10 @@ _REFUSED: Final = "This is no request of another editor of this server."
 
 
 class RelayedFacts(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The facts of a request that the editor at which it came in has verified. `identity`: who asks;
-    None for work of the server itself. `client`: the address of the client, as limits count it.
-    `request`: the request id. `is_inner`: the editor itself asks a room, and passes on no request of a
-    client."""
+    """The facts of a request that the editor at which it came in has verified. `identity`: who
+    asks; None for work of the server itself. `client`: the address of the client, as limits count
+    it. `request`: the request id. `is_inner`: the editor itself asks a room, and passes on no
+    request of a client."""
 
     identity: Identity | None = None
     client: str = ""
@@ -48,7 +48,8 @@ class RelayedFacts(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class RelaySeal:
-    """Seals relayed requests, and verifies those of other editors. `key`: the same in all editors."""
+    """Seals relayed requests, and verifies those of other editors. `key`: the same in all
+    editors."""
 
     def __init__(self, key: bytes, clock: Callable[[], float] = time.time) -> None:
         self._key = key
@@ -59,8 +60,8 @@ class RelaySeal:
     def headers(
         self, method: str, url: str, body: bytes, facts: RelayedFacts
     ) -> list[tuple[str, str]]:
-        """Return the header fields with which a request may be relayed once. `url`: where it goes, with path
-        and query."""
+        """Return the header fields with which a request may be relayed once. `url`: where it goes,
+        with path and query."""
         said = base64.urlsafe_b64encode(msgspec.json.encode(facts)).decode()
         digest = hashlib.sha256(body).hexdigest()
         at, nonce = f"{self._clock():.3f}", secrets.token_hex(16)
@@ -72,8 +73,9 @@ class RelaySeal:
         ]
 
     def verified(self, method: str, url: str, headers: Mapping[str, str]) -> RelayedFacts:
-        """Return the facts of a relayed request, whose nonce is used up by that. The caller has to compare
-        the body with the digest. Raise Unauthenticated unless another editor has sealed it just now."""
+        """Return the facts of a relayed request, whose nonce is used up by that. The caller has to
+        compare the body with the digest. Raise Unauthenticated unless another editor has sealed it
+        just now."""
         scheme, _, proof = headers.get("authorization", "").partition(" ")
         at, _, rest = proof.partition("/")
         nonce, _, mac = rest.partition("/")

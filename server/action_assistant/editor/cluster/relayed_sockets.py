@@ -1,7 +1,8 @@
-"""Relays sockets: each client's socket to this editor has an inner one, from here to the editor that has the room.
+"""Relays sockets: each client's socket to this editor has an inner one, from here to the editor
+that has the room.
 
-Messages are passed unchanged, with back-pressure: where one side does not read, the library and the server below stop
-reading from the other side, so the room sees a slow reader (rule R5).
+Messages are passed unchanged, with back-pressure: where one side does not read, the library and the
+server below stop reading from the other side, so the room sees a slow reader (rule R5).
 """
 
 import asyncio
@@ -44,8 +45,8 @@ class RelayedSocket:
         self._lost.set()
 
     async def served(self) -> tuple[int, str] | None:
-        """Pass messages on until one side ends. Return the code and text with which the client's socket
-        has to be closed; None if the client has left."""
+        """Pass messages on until one side ends. Return the code and text with which the client's
+        socket has to be closed; None if the client has left."""
         passing = [
             asyncio.create_task(self._pass_inward()),
             asyncio.create_task(self._pass_outward()),
@@ -69,8 +70,8 @@ class RelayedSocket:
         await self._inner.close(_NORMAL)
 
     async def _pass_inward(self) -> bool:
-        """Pass on what the client sends. Return True when the client has left, False when the inner socket
-        ends."""
+        """Pass on what the client sends. Return True when the client has left, False when the inner
+        socket ends."""
         while True:
             event: Any = await self._outer.receive()
             if event["type"] != "websocket.receive":
@@ -82,8 +83,8 @@ class RelayedSocket:
                 return False
 
     async def _pass_outward(self) -> bool:
-        """Pass on what the room sends. Return True when the client has left, False when the inner socket
-        ends."""
+        """Pass on what the room sends. Return True when the client has left, False when the inner
+        socket ends."""
         while True:
             try:
                 frame = await self._inner.recv(decode=False)
@@ -102,8 +103,8 @@ class RelayedSocket:
 
 
 class RelayedSockets:
-    """All relayed sockets of this editor. A socket to an editor that is frozen would stay open in silence, so
-    the database is asked once a second whether that editor still owns the stream."""
+    """All relayed sockets of this editor. A socket to an editor that is frozen would stay open in
+    silence, so the database is asked once a second whether that editor still owns the stream."""
 
     def __init__(self, peers: Callable[[], Peers]) -> None:
         self._peers = peers
@@ -112,8 +113,8 @@ class RelayedSockets:
         self._ending: set[asyncio.Task[None]] = set()
 
     async def serve(self, socket: RelayedSocket, receive: Receive, send: Send) -> None:
-        """Accept a client's socket, and pass its messages on until one side closes it. `receive`, `send`:
-        of the client."""
+        """Accept a client's socket, and pass its messages on until one side closes it. `receive`,
+        `send`: of the client."""
         self._open.setdefault(socket.url, set()).add(socket)
         if self._looking is None or self._looking.done():
             self._looking = asyncio.create_task(self._look(), name="relayed sockets")
@@ -142,8 +143,8 @@ class RelayedSockets:
                     log.warning("it cannot be asked who owns relayed graphs: %s", error.detail)
 
     async def _close_lost(self, url: str, sockets: set[RelayedSocket]) -> None:
-        """Close the sockets whose stream the editor at `url` does not own any more. Nearly always it lives
-        and owns all, and one question is enough."""
+        """Close the sockets whose stream the editor at `url` does not own any more. Nearly always
+        it lives and owns all, and one question is enough."""
         streams = {socket.stream for socket in sockets}
         for n, stream in enumerate(streams):
             if await self._peers().is_owner(stream, url):

@@ -1,9 +1,11 @@
-"""Compares the data folders of all editors of a database: sessions, tokens, passkeys and what was ended are files
-in it (decision 175), so an editor with another folder would let people in whom the others have put out.
+"""Compares the data folders of all editors of a database: sessions, tokens, passkeys and what was
+ended are files in it (decision 175), so an editor with another folder would let people in whom the
+others have put out.
 
-Each editor puts an empty file with a random name into its folder, and writes this name beside its slot. The others
-look for that file in theirs, and write which ones they have found. A copy of a folder lacks the files of those who
-came later, so it is no other editor's folder, however alike it is.
+Each editor puts an empty file with a random name into its folder, and writes this name beside its
+slot. The others look for that file in theirs, and write which ones they have found. A copy of a
+folder lacks the files of those who came later, so it is no other editor's folder, however alike it
+is.
 """
 
 import asyncio
@@ -39,8 +41,9 @@ _ALL: Final = text(
 
 @asynccontextmanager
 async def in_one_folder(journal: Journal, data: Path) -> AsyncIterator[None]:
-    """Return a context during which other editors find out that this one has their data folder (`data`). Raise
-    CannotStart if a living one has another folder, Unavailable if the database does not answer."""
+    """Return a context during which other editors find out that this one has their data folder
+    (`data`). Raise CannotStart if a living one has another folder, Unavailable if the database does
+    not answer."""
     folder = _Folder(journal, data)
     try:
         await asyncio.to_thread(folder.prepare)
@@ -102,8 +105,8 @@ class _Folder:
                 log.info("it cannot be read which editors there are: %s", error.detail)
 
     async def look(self) -> list[str]:
-        """Write which editors have this folder, and return the URLs of those that have not found the file
-        of this one. Raise Unavailable if the database does not answer."""
+        """Write which editors have this folder, and return the URLs of those that have not found
+        the file of this one. Raise Unavailable if the database does not answer."""
         rows = await self._journal.ask(
             lambda connection: connection.execute(_ALL, {"mark": self._mark}).all()
         )

@@ -1,7 +1,9 @@
-"""States that live in memory while somebody signs in, of which one of several editors has all (decision 178).
+"""States that live in memory while somebody signs in, of which one of several editors has all
+(decision 178).
 
-The owner of the stream `sign-in` has them. Other editors call it, by the way of relayed requests. Codes and secrets
-are in these calls, so both they and their answers are encrypted, under a key that follows from the token.
+The owner of the stream `sign-in` has them. Other editors call it, by the way of relayed requests.
+Codes and secrets are in these calls, so both they and their answers are encrypted, under a key that
+follows from the token.
 """
 
 import hmac
@@ -32,8 +34,8 @@ _LOST: Final = "The answer of another editor was lost: begin again."
 
 
 class SharedDesk(Desk):
-    """The states of this editor, of which it uses those of the owner. `key`: the one that follows from the
-    token, for what editors relay."""
+    """The states of this editor, of which it uses those of the owner. `key`: the one that follows
+    from the token, for what editors relay."""
 
     def __init__(
         self, owners: Callable[[], Owners], peers: Callable[[], Peers], key: bytes
@@ -54,8 +56,8 @@ class SharedDesk(Desk):
         return not isinstance(await self._owners().owner(SIGN_IN), Elsewhere)
 
     async def ask(self, path: str, values: dict[str, Any], answer_type: Any) -> Any:
-        """Return the answer of the owner to a call, in a tuple; None if no other editor owns the states by now.
-        Raise the refusal of the method, Unavailable or OutcomeUnknown."""
+        """Return the answer of the owner to a call, in a tuple; None if no other editor owns the
+        states by now. Raise the refusal of the method, Unavailable or OutcomeUnknown."""
         nonce = secrets.token_bytes(_NONCE)
         body = nonce + self._cipher.encrypt(nonce, msgspec.json.encode(values), path.encode())
         call = Call("POST", path, body=body, is_inner=True)
@@ -72,7 +74,8 @@ class SharedDesk(Desk):
         return msgspec.json.decode(plain, type=tuple[answer_type])
 
     async def answer(self, path: str, body: bytes) -> bytes:
-        """Answer a call of another editor, whose seal was verified. Raise what the method raises."""
+        """Answer a call of another editor, whose seal was verified. Raise what the method
+        raises."""
         name, _, method = path.removeprefix(CALLS).partition("/")
         held = self._held.get(name)
         function = None if held is None else getattr(type(held.store), method, None)

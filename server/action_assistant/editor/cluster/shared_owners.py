@@ -1,8 +1,9 @@
 """Owners of graphs in a Postgres database that several editors share (decision 174).
 
-The table `room` says which editor owns a stream, `editor` which editors there are. Neither protects the log:
-an editor that takes a stream raises its epoch, and each append names the epoch that it was made in. So a wrong
-suspicion that an editor is dead costs its clients a new connection and nothing else.
+The table `room` says which editor owns a stream, `editor` which editors there are. Neither protects
+the log: an editor that takes a stream raises its epoch, and each append names the epoch that it was
+made in. So a wrong suspicion that an editor is dead costs its clients a new connection and nothing
+else.
 """
 
 import asyncio
@@ -39,9 +40,9 @@ _ANSWER_S: Final = 1.0  # for a beat
 _PATIENCE_S: Final = 5.0  # for any other question
 _COMPARED_EACH: Final = 4  # beats between two comparisons of the streams owned
 _TIES: Final = 20  # how often another editor may be faster
-#: Without a beat, after which the token of an editor does not count. An editor that was frozen for more than
-#: `_DEAD_S` may go on, and would refuse what is relayed to it; one that died must not keep others from starting
-#: with a new token.
+#: Without a beat, after which the token of an editor does not count. An editor that was frozen for
+#: more than `_DEAD_S` may go on, and would refuse what is relayed to it; one that died must not keep
+#: others from starting with a new token.
 _TOKEN_COUNTS_S: Final = 5.0
 _CONNECTIONS: Final = 2
 _NOW: Final = "(extract(epoch FROM clock_timestamp()) * 1000000)::bigint"
@@ -54,7 +55,8 @@ _LOOK: Final = text(
     f"SELECT r.life, r.epoch, e.url, coalesce({_LIVES}, false) AS lives"
     " FROM room r LEFT JOIN editor e ON e.life = r.life WHERE r.stream = :stream"
 )
-#: Nothing is returned for a stream without events: a request for a graph that does not exist leaves no rows.
+#: Nothing is returned for a stream without events: a request for a graph that does not exist leaves
+#: no rows.
 _RAISE: Final = text("UPDATE head SET epoch = epoch + 1 WHERE stream = :stream RETURNING epoch")
 #: Nothing is returned if another editor was faster.
 _SHOW: Final = text(
@@ -99,9 +101,9 @@ _TIED: Final = "Other editors take this graph again and again; try again."
 
 
 class SharedOwners:
-    """Finds the owners of streams, and takes streams, as one of several editors. `journal`: opened for
-    several writers, on the Postgres database with the URL `database`; `url`: where other editors reach
-    this one."""
+    """Finds the owners of streams, and takes streams, as one of several editors. `journal`: opened
+    for several writers, on the Postgres database with the URL `database`; `url`: where other
+    editors reach this one."""
 
     def __init__(self, journal: Journal, database: str, url: str) -> None:
         self._journal = journal
@@ -123,8 +125,9 @@ class SharedOwners:
     async def joined(
         cls, journal: Journal, database: str, url: str
     ) -> AsyncIterator["SharedOwners"]:
-        """Return a context in which this editor is one of several; at its end it owns nothing any more.
-        The parameters are those of the class. Raise Unavailable if the database cannot be written."""
+        """Return a context in which this editor is one of several; at its end it owns nothing any
+        more. The parameters are those of the class. Raise Unavailable if the database cannot be
+        written."""
         owners = cls(journal, database, url)
         try:
             await owners._claim()
@@ -134,11 +137,11 @@ class SharedOwners:
             await owners._leave()
 
     async def require_same_token(self, key: bytes) -> None:
-        """Show to the other editors of this database which token this one has, without showing the token
-        itself, and compare. `key`: the key for what editors relay, which follows from the token. Raise
-        CannotStart if a living editor has another token, Unavailable if the database does not answer. Of
-        two that start at once with different tokens at least one is refused, since each shows its own
-        before it compares."""
+        """Show to the other editors of this database which token this one has, without showing the
+        token itself, and compare. `key`: the key for what editors relay, which follows from the
+        token. Raise CannotStart if a living editor has another token, Unavailable if the database
+        does not answer. Of two that start at once with different tokens at least one is refused,
+        since each shows its own before it compares."""
         proof = hmac.digest(key, b"an editor of this database", "sha256")
         values = {"proof": proof, "life": self._life}
 
@@ -158,8 +161,9 @@ class SharedOwners:
             )
 
     async def owner(self, stream: str) -> Owner:
-        """Return the owner of a stream; take the stream if no living editor owns it. Raise Unavailable if
-        the database does not answer, or if this editor is draining and nobody else owns the stream."""
+        """Return the owner of a stream; take the stream if no living editor owns it. Raise
+        Unavailable if the database does not answer, or if this editor is draining and nobody else
+        owns the stream."""
         epoch = self._mine.get(stream)
         if epoch is not None:
             return Here(epoch)
@@ -179,8 +183,8 @@ class SharedOwners:
             log.info("%s is taken from this editor later: %s", stream, cause_of(error))
 
     def check_again(self, stream: str) -> None:
-        """Forget that this editor owns a stream, because an append to it was refused: the next `owner`
-        asks the database."""
+        """Forget that this editor owns a stream, because an append to it was refused: the next
+        `owner` asks the database."""
         self._mine.pop(stream, None)
 
     def when_lost(self, hear: Callable[[str], object]) -> None:
@@ -213,8 +217,8 @@ class SharedOwners:
         raise Unavailable(_TIED)
 
     async def _look(self, connection: AsyncConnection, stream: str) -> Owner | None:
-        """Return the owner of a stream, which this editor takes if no living editor owns it. Return None
-        if another editor was faster."""
+        """Return the owner of a stream, which this editor takes if no living editor owns it. Return
+        None if another editor was faster."""
         row = (await connection.execute(_LOOK, {"stream": stream})).first()
         if row is not None and row.life == self._life:
             return Here(row.epoch)
@@ -248,8 +252,8 @@ class SharedOwners:
     # --- showing that this editor lives -----------------------------------------------------------
 
     async def _claim(self) -> None:
-        """Register this editor under the slot of its writer. The writer's own connection does that, so it
-        certainly holds the slot then."""
+        """Register this editor under the slot of its writer. The writer's own connection does that,
+        so it certainly holds the slot then."""
 
         def register(connection: Connection) -> None:
             values: dict[str, Any] = {"life": self._life, "slot": self._journal.slot}
@@ -293,8 +297,8 @@ class SharedOwners:
             await engine.dispose()
 
     def _was_heard(self, begun: float) -> None:
-        """Note that a beat was stored, which began at the time `begun`. If the beat before it was too long
-        ago, lose all streams first: others may have taken them."""
+        """Note that a beat was stored, which began at the time `begun`. If the beat before it was
+        too long ago, lose all streams first: others may have taken them."""
         if begun - self._beaten > _CUT_OFF_S + _BEAT_S:
             self._on_loop(self._lose_all)
         self._beaten = begun

@@ -1,4 +1,5 @@
-"""The rooms that are open. Each is loaded once, kept while somebody uses it, and unloaded some seconds later."""
+"""The rooms that are open. Each is loaded once, kept while somebody uses it, and unloaded some
+seconds later."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
@@ -81,8 +82,8 @@ class Rooms:
 
     @asynccontextmanager
     async def reach(self, stream: str) -> AsyncIterator["AnyRoom"]:
-        """Return a context with the room of a stream for edits of the server itself, wherever it is open.
-        Raise Unavailable if it cannot be loaded or its editor does not answer."""
+        """Return a context with the room of a stream for edits of the server itself, wherever it is
+        open. Raise Unavailable if it cannot be loaded or its editor does not answer."""
         with self._held(stream):
             if self._peers is None or not isinstance(await self._owners.owner(stream), Elsewhere):
                 yield await self._room(stream)
@@ -93,8 +94,9 @@ class Rooms:
 
     @asynccontextmanager
     async def owned(self, stream: str) -> AsyncIterator[Owner]:
-        """Return a context with the owner of a stream. If that is this editor, it stays the owner during it
-        and for some seconds, of other streams than graphs until it ends, unless another one takes the stream. Raise Unavailable as `Owners` does."""
+        """Return a context with the owner of a stream. If that is this editor, it stays the owner
+        during it and for some seconds, of other streams than graphs until it ends, unless another
+        one takes the stream. Raise Unavailable as `Owners` does."""
         with self._held(stream):
             owner = await self._owners.owner(stream)
             if isinstance(owner, Here):
@@ -138,7 +140,8 @@ class Rooms:
 
     @property
     def divergences(self) -> int:
-        """The number of pages that showed something else than their room, since this process began."""
+        """The number of pages that showed something else than their room, since this process
+        began."""
         return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
     def is_joined(self, stream: str) -> bool:
@@ -191,8 +194,8 @@ class Rooms:
         return stream in self._deleted
 
     async def drain(self) -> None:
-        """Let other editors take the rooms, those with the fewest people first. Each is closed with 1012
-        when all that was sent to it is stored."""
+        """Let other editors take the rooms, those with the fewest people first. Each is closed with
+        1012 when all that was sent to it is stored."""
         self._draining = True
         await self._owners.drain()
         for room in sorted(self.open_rooms(), key=lambda each: len(each.members)):
@@ -267,8 +270,8 @@ class Rooms:
             self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
 
     def _lose(self, stream: str) -> None:
-        """End the room of a stream at once, since another editor owns it now. What its clients have sent
-        and was not acknowledged they send again, to that editor."""
+        """End the room of a stream at once, since another editor owns it now. What its clients have
+        sent and was not acknowledged they send again, to that editor."""
         self._taken.discard(stream)
         self._deleted.discard(stream)
         room = self._rooms.get(stream)

@@ -37,7 +37,8 @@ AnyRoom: TypeAlias = "Room | RemoteRoom"
 
 
 class RemoteRoom:
-    """The room of a stream at the editor that owns it, with what edits of the server need of a room."""
+    """The room of a stream at the editor that owns it, with what edits of the server need of a
+    room."""
 
     def __init__(self, stream: str, peers: Peers) -> None:
         self._target = ROOMS + quote(stream, safe="")
@@ -55,8 +56,8 @@ class RemoteRoom:
     async def submit_in_turn(
         self, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
     ) -> int:
-        """Do what `Room.submit_in_turn` does; the time for `compute` includes the way to the other editor.
-        Raise OutcomeUnknown, too, if the answer was lost."""
+        """Do what `Room.submit_in_turn` does; the time for `compute` includes the way to the other
+        editor. Raise OutcomeUnknown, too, if the answer was lost."""
         begin = Call("GET", f"{self._target}?{urlencode({TURN: author})}", is_inner=True)
         headers, state = await self._ask(begin)
         turn = f"{self._target}?{urlencode({TURN: headers[TURN_HEADER]})}"
@@ -80,7 +81,8 @@ class RemoteRoom:
         return self.seq
 
     async def _ask(self, call: Call) -> tuple[httpx.Headers, bytes]:
-        """Return the header fields and the body of an answer. Raise the refusal of the other editor."""
+        """Return the header fields and the body of an answer. Raise the refusal of the other
+        editor."""
         async with self._peers.answer(self._stream, call) as answer:
             if answer is None:
                 raise Unavailable(_MOVED)

@@ -47,8 +47,8 @@ class PracticeRobot:
 
 
 def registration_beside(taken: Collection[int]) -> Registration:
-    """Return a registration of the robot on a domain that is not `taken`. Raise Unavailable if all domains
-    are."""
+    """Return a registration of the robot on a domain that is not `taken`. Raise Unavailable if all
+    domains are."""
     for domain in _DOMAINS:
         if domain not in taken:
             return Registration(name=NAME, domain=domain, led=True)
