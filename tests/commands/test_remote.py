@@ -2,7 +2,7 @@
 
 import json
 import socket
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from functools import partial
@@ -27,6 +27,7 @@ from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from support.product import TOKEN, Product, running
+from support.waiting import until, wait_until
 
 QUICK = {"behaviours": {"*": [{"after_s": 0.05}]}}
 ENDLESS = {"behaviours": {"*": [{"never": True}]}}
@@ -206,7 +207,7 @@ def test_the_edit_that_made_a_run_go_another_way_is_named(
     anyio.run(cut, product, graph)
     run = product.cli("run", graph, "--script", files["quick"], "--no-wait").stdout.split()[0]
     with product.runner() as runner:
-        anyio.run(until, lambda: _ended(runner.get(f"/api/runs/{run}").json(), "A_0"))
+        until("A_0 did not end", lambda: _ended(runner.get(f"/api/runs/{run}").json(), "A_0"))
     product.cli("stop", run)
     found = product.cli("runs", "since", run)
     assert found.returncode == 1, found.stdout + found.stderr
@@ -237,7 +238,7 @@ async def drawing(product: Product, graph: str) -> AsyncIterator[Doc[Any]]:
         aconnect_ws(address, client, headers=headers) as socket,
         Provider(doc, HttpxWebsocket(socket, address)),
     ):
-        await until(lambda: any("entry>" in key for key in relations))
+        await wait_until(lambda: any("entry>" in key for key in relations))
         yield doc
 
 
@@ -251,7 +252,7 @@ async def cut(product: Product, graph: str) -> None:
                     del relations[key]
         with product.editor() as editor:
             umrf = f"/api/graphs/{graph}/umrf"
-            await until(lambda: not editor.get(umrf).json()["actions"][0].get("children"))
+            await wait_until(lambda: not editor.get(umrf).json()["actions"][0].get("children"))
 
 
 async def wait_at(product: Product, graph: str, name: str, mark: str) -> None:
@@ -262,7 +263,7 @@ async def wait_at(product: Product, graph: str, name: str, mark: str) -> None:
         actions[f"{key}|breakpoint"] = mark
         with product.editor() as editor:
             path = f"/api/graphs/{graph}/breakpoints"
-            await until(lambda: editor.get(path).json() != [])
+            await wait_until(lambda: editor.get(path).json() != [])
 
 
 def test_a_led_run_takes_the_breakpoints_of_its_graph_where_the_command_says_so(
@@ -312,7 +313,7 @@ def test_an_opened_run_takes_the_breakpoints_inside_and_so_does_one_that_continu
     assert first["actions"][mark["action"]]["levels"] == ["marked_0"]
     assert set(mark) == {"action"}, "visits of a sub-graph are none of the whole graph"
     with product.runner() as runner:
-        anyio.run(until, lambda: shown(runner, first["id"])["held"] is not None)
+        until("the run was not held", lambda: shown(runner, first["id"])["held"] is not None)
         held = shown(runner, first["id"])["held"]
         assert held["how"] == "breakpoint"
         product.cli("stop", first["id"])
@@ -332,13 +333,6 @@ def _started(product: Product, *command: str) -> dict[str, Any]:
 def shown(runner: httpx.Client, run: str) -> dict[str, Any]:
     found: dict[str, Any] = runner.get(f"/api/runs/{run}").json()
     return found
-
-
-async def until(true: Callable[[], bool]) -> None:
-    """Wait for something that must happen."""
-    with anyio.fail_after(20):
-        while not true():  # noqa: ASYNC110 - what it waits for is in other processes
-            await anyio.sleep(0.05)
 
 
 def test_a_stop_insists_where_connections_break() -> None:

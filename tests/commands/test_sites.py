@@ -13,8 +13,8 @@ import pytest
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from support.command_line import ran
-from support.product import Product
-from support.two_sites import HALL_A, HALL_B, SecondRunner, frozen, two_sites
+from support.product import Product, frozen
+from support.two_sites import HALL_A, HALL_B, SecondRunner, two_sites
 
 ENDLESS = {"behaviours": {"*": [{"never": True}]}}
 GRAPH = {

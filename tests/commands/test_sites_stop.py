@@ -10,8 +10,8 @@ import pytest
 from action_assistant.commands.stored_tokens import StoredToken, file_of
 from commands.test_sites import Halls, started_at, state
 from support.command_line import ran
-from support.product import Product
-from support.two_sites import HALL_A, HALL_B, frozen, two_sites
+from support.product import Product, frozen
+from support.two_sites import HALL_A, HALL_B, two_sites
 
 NOT_KNOWN = "NOT KNOWN whether there are further runners"
 

@@ -22,9 +22,9 @@ BEARER = {"authorization": f"Bearer {TOKEN}"}
 class Editor:
     """An editor on a free port. `kill` and `start` may be called in turn."""
 
-    def __init__(self, data: Path, database: str | None = None) -> None:
+    def __init__(self, data: Path, database: str | None = None, *flags: str) -> None:
         self.data = data
-        self._database = ["--database", database] if database else []
+        self._flags = [*(["--database", database] if database else []), *flags]
         self.port = free_ports()
         self.log = data.parent / f"{data.name}.log"
         self._process: warm.Process | None = None
@@ -33,33 +33,51 @@ class Editor:
     def url(self) -> str:
         return f"http://127.0.0.1:{self.port}"
 
+    @property
+    def process(self) -> warm.Process:
+        """Its process, which has begun."""
+        assert self._process is not None
+        return self._process
+
+    @property
+    def words(self) -> list[str]:
+        """The words after the name of the program."""
+        return ["editor", "--data", str(self.data), "--port", str(self.port), *self._flags]
+
     def start(self) -> None:
         """Start it and wait until it answers."""
-        words = ["editor", "--data", str(self.data), "--port", str(self.port), *self._database]
-        environ = {**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN}
-        self._process = warm.start(words, environ, self.log)
+        self.begin()
+        self.wait()
+
+    def begin(self, **environ: str) -> None:
+        """Start it. `environ`: further variables of its environment."""
+        given = {**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN, **environ}
+        self._process = warm.start(self.words, given, self.log)
+
+    def wait(self) -> None:
+        """Wait until it answers."""
         deadline = time.monotonic() + 120
         while True:
             with contextlib.suppress(httpx.TransportError):
                 if httpx.get(f"{self.url}/readyz", trust_env=False).status_code == 200:
                     return
-            if time.monotonic() > deadline or self._process.poll() is not None:
+            if time.monotonic() > deadline or self.process.poll() is not None:
                 raise AssertionError(f"not ready:\n{self.log.read_text()[-4000:]}")
             time.sleep(0.05)
 
     def kill(self) -> None:
-        """kill -9."""
-        assert self._process is not None
-        self._process.kill()
-        self._process.wait()
-        self._process = None
+        """kill -9, whatever it is doing. Do nothing if it does not run."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
 
     def end(self) -> int:
         """Ask it to end; the exit code."""
         if self._process is None:
             return 0
-        self._process.send_signal(signal.SIGTERM)
-        code = self._process.wait(20)
+        self._process.terminate()
+        code = self._process.wait(30)
         self._process = None
         return code
 

@@ -18,8 +18,9 @@ from action_assistant.journal.journal import Journal
 from editor.process import running
 from editor.test_postgres import Hand, made, seen
 from journal.failover_cluster import Cluster, Node, are_installed, cluster
-from journal.test_postgres import Writers, draft, opened, until
+from journal.test_postgres import Writers, draft, opened
 from journal.whole_log import whole_log
+from support.waiting import wait_until
 
 FAILOVERS = int(os.environ.get("SOAK_FAILOVERS", "2"))
 
@@ -155,7 +156,7 @@ async def test_an_editor_with_people_goes_on_at_the_replica(
                 began = time.monotonic()
                 await (lose_power, freeze)[turn % 2](nodes, primary)
                 promoted = time.monotonic() - began
-                await until(partial(is_more, sum(map(len, told.values()))), within=90)
+                await wait_until(partial(is_more, sum(map(len, told.values()))), seconds=90)
                 print(  # noqa: T201 - a figure of the soak
                     f"promoted after {promoted:.1f} s, stored again after {time.monotonic() - began:.1f} s"
                 )

@@ -7,7 +7,6 @@ import shutil
 import sqlite3
 import threading
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,6 +17,7 @@ from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import Sqlite
 from journal.crashes import Disk, Driver
+from support.waiting import wait_until
 
 DRAFT = Draft("thing.happened.v1", "ada", b"x")
 
@@ -110,12 +110,6 @@ async def test_a_closed_journal_is_one_file(tmp_path: Path) -> None:
     await copy.close()
 
 
-async def until(is_so: Callable[[], bool]) -> None:
-    async with asyncio.timeout(30):
-        while not is_so():  # noqa: ASYNC110 - a thread does it
-            await asyncio.sleep(0.01)
-
-
 class _FileWrites(Disk):
     """A disk that notes which threads write to the database file itself, beside its log."""
 
@@ -144,7 +138,7 @@ async def test_no_commit_copies_the_log_into_the_file(
     for n in range(1, 5):  # SQLite would copy its log after each of them
         await journal.append("a", [Draft("big.v1", "ada", body)])
         await journal.derive(lambda connection: connection.exec_driver_sql("SELECT 1"))
-        await until(lambda: path.stat().st_size > n * len(body))  # noqa: B023
+        await wait_until(lambda: path.stat().st_size > n * len(body))  # noqa: B023
     assert set(disk.by) == {copies}
     assert disk.log_size < 15_000_000  # it begins anew when all of it was copied
     await journal.close()
@@ -168,7 +162,7 @@ async def test_the_log_that_a_long_reader_keeps_is_copied_once_it_has_gone(
     reader.execute("ROLLBACK")
     reader.close()
     await journal.append("a", [DRAFT])
-    await until(lambda: path.stat().st_size > 1_000_000)
+    await wait_until(lambda: path.stat().st_size > 1_000_000)
     await journal.close()
 
 

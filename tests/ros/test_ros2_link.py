@@ -4,7 +4,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,7 @@ from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from ros.echo_engine import EchoEngine, graph_text
 from runner.harness import sequence
+from support.waiting import wait_until
 
 
 def clock_us() -> int:
@@ -91,14 +92,8 @@ async def robot(domain: int, name: str = "robot", **more: Any) -> AsyncIterator[
         tasks.cancel_scope.cancel()
 
 
-async def eventually(holds: Callable[[], object], seconds: float = 25) -> None:
-    with anyio.fail_after(seconds):
-        while not holds():  # noqa: ASYNC110 what is waited for is in another process
-            await anyio.sleep(0.02)
-
-
 async def answering(link: Link) -> None:
-    await eventually(lambda: link.standing.state == "answering")
+    await wait_until(lambda: link.standing.state == "answering")
 
 
 def placed(name: str = "patrol", run: str = "r1") -> Order:
@@ -112,7 +107,7 @@ async def test_a_start_reaches_the_engine_once_whole_and_addressed(domain: int) 
             await answering(link)
             order = placed()
             await link.start(order)
-            await eventually(lambda: node.heard)
+            await wait_until(lambda: node.heard)
             await anyio.sleep(0.3)
             (message,) = node.commands("start")
             assert message.umrf_graph_json == order.umrf
@@ -127,7 +122,7 @@ async def test_every_command_arrives_on_the_topic_of_this_engine(domain: int) ->
             await link.resume("patrol")
             await link.modify(placed(), continue_from="Work_0")
             await link.stop("patrol")
-            await eventually(lambda: len(node.heard) == 4)
+            await wait_until(lambda: len(node.heard) == 4)
             (modify,) = node.commands("modify")
             assert modify.continue_from == "Work_0"
             assert {kind for _, kind, _ in node.heard} == {"pause", "resume", "modify", "stop"}
@@ -164,7 +159,7 @@ async def test_stops_of_many_graphs_leave_one_by_one_and_those_of_one_graph_toge
                 for graph in ("one", "two", "three"):
                     for link in links:
                         stops.start_soon(link.stop, graph)
-            await eventually(lambda: len(node.heard) == 3)
+            await wait_until(lambda: len(node.heard) == 3)
             tasks.cancel_scope.cancel()
         got = {each.umrf_graph_name: list(each.targets) for each in node.commands("stop")}
         assert got == {"one": ["a", "b"], "two": ["a", "b"], "three": ["a", "b"]}
@@ -182,7 +177,7 @@ async def test_a_newest_first_batch_is_told_oldest_first(domain: int) -> None:
                     graph_text(Work="RUNNING"),
                     graph_text(Work="UNINITIALIZED"),
                 )
-                await eventually(lambda: any(isinstance(each, Feedback) for each in heard))
+                await wait_until(lambda: any(isinstance(each, Feedback) for each in heard))
             (told,) = [each for each in heard if isinstance(each, Feedback)]
             assert [each.nodes["Work_0"] for each in told.snapshots] == [
                 "UNINITIALIZED",
@@ -201,14 +196,14 @@ async def test_commands_of_others_are_told_and_our_own_are_not(domain: int) -> N
                 await link.stop("patrol")
                 order = placed()
                 await link.start(order)
-                await eventually(lambda: len(node.heard) == 2)
+                await wait_until(lambda: len(node.heard) == 2)
                 other.speak()
-                await eventually(lambda: link.standing.others == 1)
+                await wait_until(lambda: link.standing.others == 1)
                 other.publish("stop", umrf_graph_name="patrol", targets=["robot"])
                 other.publish("start", umrf_graph_json=order.umrf, targets=["robot", "x"])
                 other.publish("stop", umrf_graph_name="patrol", targets=["somebody-else"])
                 foreign = lambda: [each for each in heard if isinstance(each, ForeignCommand)]  # noqa: E731
-                await eventually(lambda: len(foreign()) >= 2 and len(node.heard) == 5)
+                await wait_until(lambda: len(foreign()) >= 2 and len(node.heard) == 5)
                 await anyio.sleep(0.2)
             told = {each.command: each for each in foreign()}
             assert len(foreign()) == 2
@@ -227,13 +222,13 @@ async def test_lines_of_the_engines_log_come_with_the_graph_they_name(domain: in
                 node.log("Graph 'patrol' finished.")
                 node.log("The Action Engine is initialized.")
                 lines = lambda: [each for each in heard if isinstance(each, EngineLog)]  # noqa: E731
-                await eventually(lambda: len(lines()) == 3)
+                await wait_until(lambda: len(lines()) == 3)
             assert [each.graph for each in lines()] == ["patrol", "patrol", None]
 
 
 async def test_nobody_there_is_said_at_once_and_without_waiting(domain: int) -> None:
     async with robot(domain) as link:
-        await eventually(lambda: "Nobody answers" in link.standing.why)
+        await wait_until(lambda: "Nobody answers" in link.standing.why)
         assert link.standing.state == "gone"
         with pytest.raises(NoAnswer, match=f"Nobody answers on umrf_graph_get on domain {domain}"):
             await link.get()
@@ -248,13 +243,13 @@ async def test_two_engines_on_one_path_prove_nothing(domain: int) -> None:
         async with robot(domain) as link:
             await answering(link)
             with engine(domain):
-                await eventually(lambda: link.standing.servers == 2)
+                await wait_until(lambda: link.standing.servers == 2)
                 asked = node.asked
                 with pytest.raises(NoAnswer, match="2 engines answer"):
                     await link.get()
                 assert node.asked == asked
                 assert link.standing.state == "busy"
-            await eventually(lambda: link.standing.servers == 1)
+            await wait_until(lambda: link.standing.servers == 1)
             await link.get()
 
 
@@ -265,20 +260,20 @@ async def test_a_node_that_hears_starts_and_does_not_serve_may_be_a_second_engin
     with engine(domain), engine(domain, namespace="r2"):
         async with robot(domain) as link:
             await answering(link)
-            await eventually(lambda: link.standing.newcomers == ())
+            await wait_until(lambda: link.standing.newcomers == ())
             with listener(domain, NODE) as rising:
-                await eventually(lambda: link.standing.newcomers == (NODE,))
+                await wait_until(lambda: link.standing.newcomers == (NODE,))
                 assert (link.standing.servers, (await link.get()).graphs) == (1, ())
                 assert f"{NODE} hears starts and does not answer gets" in link.standing.doubt
                 rising.create_service(UmrfGraphGet, "umrf_graph_get", lambda _, it: it)
-                await eventually(lambda: link.standing.servers == 2)
-            await eventually(lambda: link.standing.doubt == "")
+                await wait_until(lambda: link.standing.servers == 2)
+            await wait_until(lambda: link.standing.doubt == "")
             with listener(domain, "recorder") as recorder:
-                await eventually(lambda: link.standing.newcomers == ("recorder",))
+                await wait_until(lambda: link.standing.newcomers == ("recorder",))
                 recorder.create_subscription(
                     UmrfGraphFeedback, "/umrf_graph_feedback", lambda _: None, 1
                 )
-                await eventually(lambda: link.standing.doubt == "")
+                await wait_until(lambda: link.standing.doubt == "")
 
 
 async def test_engines_with_paths_of_their_own_are_told_apart(domain: int) -> None:
@@ -288,14 +283,14 @@ async def test_engines_with_paths_of_their_own_are_told_apart(domain: int) -> No
             heard: list[Report] = []
             with link.listen(heard.append):
                 await answering(link)
-                await eventually(lambda: len(link.standing.listeners) and link._domain)
+                await wait_until(lambda: len(link.standing.listeners) and link._domain)
                 for _ in range(20):
                     assert [each.graph for each in (await link.get()).graphs] == ["first"]
                 one.log("Graph 'first' finished.")
                 two.log("Graph 'second' finished.")
                 two.say(graph_text("second", run="r9"), actor="two")
                 one.say(graph_text("first", run="r1"), actor="one")
-                await eventually(
+                await wait_until(
                     lambda: (
                         any(isinstance(each, Feedback) for each in heard)
                         and any(isinstance(each, EngineLog) for each in heard)
@@ -318,7 +313,7 @@ async def test_an_engine_that_was_replaced_is_told_as_restarted(domain: int) -> 
             with engine(domain):
                 await answering(link)
                 first = (await link.get()).incarnation
-            await eventually(lambda: link.standing.state == "gone")
+            await wait_until(lambda: link.standing.state == "gone")
             with engine(domain):
                 await answering(link)
                 assert (await link.get()).incarnation != first
@@ -336,7 +331,7 @@ async def test_a_frozen_engine_is_busy_and_late_answers_go_nowhere(domain: int) 
             with anyio.move_on_after(1.2) as asked:
                 await link.get()
             assert asked.cancelled_caught
-            await eventually(lambda: link.standing.state == "busy")
+            await wait_until(lambda: link.standing.state == "busy")
             node.running = [graph_text()]
             node.holding.clear()
             assert [each.graph for each in (await link.get()).graphs] == ["patrol"]
@@ -366,7 +361,7 @@ async def test_a_killed_engine_is_never_said_to_answer(
         with pytest.raises(TimeoutError):
             with anyio.fail_after(1.2):
                 await link.get()
-        await eventually(lambda: link.standing.state == "busy")
+        await wait_until(lambda: link.standing.state == "busy")
 
 
 async def test_another_middleware_is_refused_with_what_to_do(domain: int) -> None:
@@ -410,8 +405,8 @@ async def test_stop_does_not_wait_for_megabytes_of_feedback(domain: int) -> None
                 node.say(*[large] * 20)
                 node.say(*[large] * 20)
                 await link.stop("large")
-                await eventually(lambda: node.commands("stop"))
-                await eventually(lambda: sum(isinstance(each, Feedback) for each in seen) == 2)
+                await wait_until(lambda: node.commands("stop"))
+                await wait_until(lambda: sum(isinstance(each, Feedback) for each in seen) == 2)
             assert all(len(each.snapshots) == 20 for each in seen if isinstance(each, Feedback))
 
 

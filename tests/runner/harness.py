@@ -57,6 +57,7 @@ from action_assistant.umrf.model import (
     Relation,
 )
 from action_assistant.umrf.semantics import Engine, Script, script_from
+from support.waiting import wait_until
 
 ANN = Author("ann", "Ann")
 BEN = Author("ben", "Ben")
@@ -455,10 +456,8 @@ def two_lines(name: str = "two_lines") -> Graph:
 
 
 async def until(true: Callable[[], bool], patience: float = 60.0) -> None:
-    """Wait for something that must happen."""
-    with anyio.fail_after(patience):
-        while not true():  # noqa: ASYNC110 - what it waits for has many sources
-            await anyio.sleep(0.01)
+    """Wait for something that must happen, for `patience` seconds, most often virtual ones."""
+    await wait_until(true, patience)
 
 
 async def ended(control: ExecutionService, run: str) -> str:

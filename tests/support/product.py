@@ -182,6 +182,16 @@ class Product:
         return _client(self.runner_url)
 
 
+@contextmanager
+def frozen(process: psutil.Process) -> Iterator[None]:
+    """Freeze a process inside the block."""
+    process.suspend()
+    try:
+        yield
+    finally:
+        process.resume()
+
+
 def _client(url: str) -> httpx.Client:
     return httpx.Client(
         base_url=url, headers={"authorization": f"Bearer {TOKEN}"}, trust_env=False, timeout=20

@@ -7,22 +7,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
-import psutil
 
 from support import warm
 from support.product import TOKEN, Product, free_ports
 
 HALL_A, HALL_B = "Hall A", "Hall B"
-
-
-@contextmanager
-def frozen(process: psutil.Process) -> Iterator[None]:
-    """Freeze a process meanwhile."""
-    process.suspend()
-    try:
-        yield
-    finally:
-        process.resume()
 
 
 class SecondRunner:

@@ -1,8 +1,10 @@
-"""Waits in tests that follow real processes, which tell nobody when they are ready."""
+"""Waits for what tells nobody when it happens: real processes, threads, databases."""
 
 import time
 from collections.abc import Callable
 from typing import TypeVar
+
+import anyio
 
 T = TypeVar("T")
 
@@ -17,3 +19,10 @@ def until(
         assert time.monotonic() < deadline, f"{what} {shown()}"
         time.sleep(0.05)
     return found
+
+
+async def wait_until(holds: Callable[[], object], seconds: float = 60) -> None:
+    """Ask until `holds` returns something true. Raise TimeoutError after `seconds`."""
+    with anyio.fail_after(seconds):
+        while not holds():  # noqa: ASYNC110 - nobody tells
+            await anyio.sleep(0.01)

@@ -13,15 +13,7 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages as wire
 from editor.process import BEARER, Editor
-
-
-async def eventually(holds: Any) -> None:
-    """Wait until something holds."""
-    for _ in range(500):
-        if holds():
-            return
-        await asyncio.sleep(0.01)
-    raise AssertionError("never happened")
+from support.waiting import wait_until
 
 
 async def got(http: httpx.Client, path: str, **query: int) -> httpx.Response:
@@ -71,7 +63,7 @@ async def test_stock_clients_converge(editor: Editor, http: httpx.Client, graph:
         one.get("meta", type=Map)["name"] = "renamed by one"
         two.get("meta", type=Map)["description"] = "by two"
         named = {"schema", "name", "description", "direction"}
-        await eventually(lambda: things(one) == things(two) and things(one).keys() == named)
+        await wait_until(lambda: things(one) == things(two) and things(one).keys() == named)
     view = (await got(http, f"/api/graphs/{graph}")).json()
     assert (view["name"], view["description"], view["seq"]) == ("renamed by one", "by two", 3)
 
@@ -82,7 +74,7 @@ async def test_an_edit_over_http_reaches_the_people_in_the_room(
     doc: Doc[Any] = Doc()
     async with editor.joined(graph, doc):
         await asyncio.to_thread(http.patch, f"/api/graphs/{graph}", json={"name": "new"})
-        await eventually(lambda: things(doc)["name"] == "new")
+        await wait_until(lambda: things(doc)["name"] == "new")
 
 
 async def test_acknowledgements_are_for_those_who_ask(editor: Editor, graph: str) -> None:
@@ -250,7 +242,7 @@ async def test_a_frozen_reader_is_dropped_while_others_go_on(editor: Editor, gra
             writer.get("positions", type=Map)[f"k{n}"] = "x" * 500_000
             await session.send_bytes(wire.change(made[-1]))
             await acks(session, n + 1)
-        await eventually(lambda: len(reader.get("positions", type=Map)) == 40)
+        await wait_until(lambda: len(reader.get("positions", type=Map)) == 40)
     writer.unobserve(subscription)
     frozen.settimeout(10)
     received = 0

@@ -1,4 +1,5 @@
-"""An editor whose owners of graphs are what a file says. Run as a script: DATA DATABASE PORT INNER_PORT FILE."""
+"""An editor whose owners of graphs are what a file says. Run as a script: DATA DATABASE PORT
+INNER_PORT FILE."""
 
 import json
 import sys
@@ -12,8 +13,8 @@ from action_assistant.web.server.listen import serve
 
 
 class FixedOwners(Alone):
-    """Owners by a file, which never move by themselves: the URL of the owner of each stream, and of all
-    others under `*`."""
+    """Owners by a file, which never move by themselves: the URL of the owner of each stream, and of
+    all others under `*`."""
 
     def __init__(self, file: Path, url: str) -> None:
         self._file = file

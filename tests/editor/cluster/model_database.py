@@ -2,7 +2,7 @@
 must keep."""
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 Mutant = Literal[
     "",
@@ -13,14 +13,8 @@ Mutant = Literal[
     "relay without 421",
     "position from a sequence",
 ]
-MUTANTS: Final[tuple[Mutant, ...]] = (
-    "no epoch in the compare",
-    "check without lock",
-    "acknowledge before the commit",
-    "take over without loading",
-    "relay without 421",
-    "position from a sequence",
-)
+#: Mistakes in the rules, each of which the model has to find.
+MUTANTS: Final[tuple[Mutant, ...]] = tuple(each for each in get_args(Mutant) if each)
 
 DEAD: Final = 2.0  # seconds without a beat
 

@@ -11,14 +11,14 @@ import httpx
 import httpx_ws
 import pytest
 
+from editor.cluster.clients import Stubborn
 from editor.cluster.several import OneOfSeveral, started
-from editor.cluster.test_relay import until
-from editor.cluster.test_several_editors import Stubborn
 from editor.process import BEARER
 from journal.servers import Server
 from support.product import free_ports
 from support.provider import CLIENT, SECRET, provided
 from support.proxy import EDITORS, NGINX, nginx
+from support.waiting import wait_until
 from web.auth.test_passkeys import Authenticator
 
 pytestmark = pytest.mark.skipif(not NGINX, reason="nginx is not installed")
@@ -99,7 +99,9 @@ async def test_a_killed_editor_is_not_missed_behind_the_documented_nginx(
                     editors[0].kill()
             for some in people.values():
                 keys = set().union(*(each.written for each in some))
-                await until(lambda some=some, keys=keys: all(each.has(keys) for each in some), 90)
+                await wait_until(
+                    lambda some=some, keys=keys: all(each.has(keys) for each in some), 90
+                )
             for some in people.values():
                 for each in some:
                     await each.aclose()

@@ -18,8 +18,8 @@ from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person
 from editor.client import updates
 from editor.cluster.conftest import Pair
-from editor.cluster.test_relay import until
 from support.product import TOKEN
+from support.waiting import wait_until
 
 SEAL = RelaySeal(Keys(TOKEN).relay_key)
 OWNER = RelayedFacts(Identity(Person("ann", "Ann", "owner")), "192.0.2.7", "request-1")
@@ -225,7 +225,7 @@ async def test_edits_of_people_wait_for_a_turn_in_a_remote_room(pair: Pair) -> N
             return update
 
         assert await room.submit_in_turn("ann", compute) == before + 1
-        await until(lambda: things.get("seen") == 0.0)
+        await wait_until(lambda: things.get("seen") == 0.0)
         while room.seq < before + 2:  # the edit that waited is stored
             await room.now()
         before = room.seq

@@ -83,7 +83,7 @@ async def test_a_later_version_comes_in_one_editor_after_the_other(
             await again(editors[0])
             await asyncio.to_thread(editors[1].end)
             editors[1].begin()  # by mistake still the version of before
-            assert await asyncio.to_thread(editors[1].child.wait, 60) != 0
+            assert await asyncio.to_thread(editors[1].process.wait, 60) != 0
             assert "was made by a newer version of this program" in editors[1].log.read_text()
             becomes(editors[1], later)
             editors[1].begin()
@@ -105,7 +105,7 @@ def test_tables_that_others_could_not_use_change_only_after_their_end(
         two.end()
         becomes(two, later)
         two.begin()
-        assert two.child.wait(60) != 0
+        assert two.process.wait(60) != 0
         assert "other editors use them and could not go on: end those first." in two.log.read_text()
         there = postgres.ask("SELECT version_num FROM alembic_version", name)
         assert there == revisions_of("editor")[-1]

@@ -1,8 +1,6 @@
 """Several editors of one Postgres are one server to whoever uses them."""
 
 import asyncio
-import contextlib
-import os
 import random
 import shutil
 import signal
@@ -13,23 +11,18 @@ from typing import Any
 import httpx
 import httpx_ws
 import pytest
-from pycrdt import (
-    Doc,
-    Map,
-    YMessageType,
-    create_sync_message,
-    create_update_message,
-    handle_sync_message,
-)
+from pycrdt import Doc, Map
 
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
+from editor.cluster.clients import Stubborn, closed
 from editor.cluster.several import OneOfSeveral, several
-from editor.cluster.test_relay import closed, until
 from editor.process import BEARER
 from journal.servers import Server
+from support.waiting import wait_until
 
-FROZEN_S = float(os.environ.get("SOAK_FROZEN_S", "8"))
+#: Longer than the others take to call an editor dead, and to own its graphs.
+_FROZEN_S = 8.0
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +51,7 @@ async def test_people_at_all_editors_are_in_one_room(editors: list[OneOfSeveral]
         for n in range(40):
             for which, doc in enumerate(docs):
                 doc.get("meta", type=Map)[f"{which}-{n}"] = float(n)
-        await until(lambda: all(len(doc.get("meta", type=Map)) >= 120 for doc in docs))
+        await wait_until(lambda: all(len(doc.get("meta", type=Map)) >= 120 for doc in docs))
     assert len({asked(each, "GET", f"/api/graphs/{graph}")["seq"] for each in editors}) == 1
 
 
@@ -72,8 +65,8 @@ async def test_graphs_and_people_of_one_editor_are_known_at_all(
     assert "elsewhere" in [each["name"] for each in asked(two, "GET", "/api/graphs")]
     asked(one, "POST", "/api/members", json={"name": "Mari", "role": "editor"})
     link = asked(two, "POST", "/api/invitations", json={"role": "viewer", "label": "tour"})
-    await until(lambda: "Mari" in str(asked(three, "GET", "/api/members")))
-    await until(lambda: link["id"] in str(asked(three, "GET", "/api/invitations")))
+    await wait_until(lambda: "Mari" in str(asked(three, "GET", "/api/members")))
+    await wait_until(lambda: link["id"] in str(asked(three, "GET", "/api/invitations")))
     asked(two, "DELETE", f"/api/graphs/{graph}")
     with one.client() as client:
         assert client.get(f"/api/graphs/{graph}").status_code == 404
@@ -88,7 +81,7 @@ async def test_a_rule_that_is_set_at_one_editor_holds_at_all(editors: list[OneOf
     link = asked(three, "POST", "/api/invitations", json={"role": "viewer", "label": ""})
     async with httpx.AsyncClient(base_url=three.url, trust_env=False) as guest:
         origin = {"origin": three.url}
-        await until(lambda: link["id"] in str(asked(three, "GET", "/api/invitations")))
+        await wait_until(lambda: link["id"] in str(asked(three, "GET", "/api/invitations")))
         proof = {"invitation": link["path"].partition("=")[2], "name": "Gus"}
         assert (await guest.post("/api/session", json=proof, headers=origin)).is_success
         assert (await guest.get(f"/api/graphs/{graph}")).status_code == 200
@@ -98,7 +91,7 @@ async def test_a_rule_that_is_set_at_one_editor_holds_at_all(editors: list[OneOf
             asked(one, "PUT", f"/api/folders/{folder}/rule", json=rule)
             assert await closed(socket) == 4404
         assert (await guest.get(f"/api/graphs/{graph}")).status_code == 404
-        await until(lambda: link["id"] in str(asked(one, "GET", "/api/invitations")))
+        await wait_until(lambda: link["id"] in str(asked(one, "GET", "/api/invitations")))
         asked(one, "POST", f"/api/invitations/{link['id']}/revoke")
         assert (await guest.get("/api/graphs")).status_code == 401
 
@@ -111,7 +104,7 @@ async def test_a_personal_link_lets_one_browser_in_at_whichever_editor(
             editors[n], "POST", "/api/members", json={"name": f"Mari {n}", "role": "editor"}
         )
         proof = made["links"][0]["path"].partition("=")[2]
-        await until(
+        await wait_until(
             lambda made=made: all(
                 made["id"] in str(asked(each, "GET", "/api/members")) for each in editors
             )
@@ -130,11 +123,10 @@ async def test_a_personal_link_lets_one_browser_in_at_whichever_editor(
         assert len([status for status in came if status < 300]) == 1, came
 
 
-def test_an_action_of_the_library_is_changed_in_graphs_that_other_editors_have_open(
+def test_edits_of_the_server_reach_graphs_that_other_editors_have_open(
     editors: list[OneOfSeveral],
 ) -> None:
     one, two, three = editors
-    action = asked(one, "POST", "/api/actions", json={"name": "Grip"})["id"]
     graph = asked(two, "POST", "/api/graphs", json={"name": "uses it"})["id"]
     seq = asked(two, "GET", f"/api/graphs/{graph}")["seq"]
     asked(two, "PATCH", f"/api/graphs/{graph}", json={"description": "open there"})
@@ -152,7 +144,6 @@ def test_an_action_of_the_library_is_changed_in_graphs_that_other_editors_have_o
     assert merged["changed"]
     for each in editors:
         assert asked(each, "GET", f"/api/graphs/{graph}")["description"] == "of the draft"
-        assert asked(each, "GET", f"/api/actions/{action}/umrf")
         assert asked(each, "GET", f"/api/graphs/{graph}/history")
 
 
@@ -175,7 +166,7 @@ async def test_every_editor_lists_who_is_in_a_graph_wherever_it_is_open(
         return len(listed(q="kadri", limit=5))
 
     link = asked(editors[2], "POST", "/api/members", json={"name": "Kadri", "role": "viewer"})
-    await until(lambda: "Kadri" in str(asked(editors[1], "GET", "/api/members")))
+    await wait_until(lambda: "Kadri" in str(asked(editors[1], "GET", "/api/members")))
     assert (listed(), found()) == ([[], [], []], 0)
     async with httpx.AsyncClient(base_url=editors[1].url, trust_env=False) as browser:
         proof = {"invitation": link["links"][0]["path"].partition("=")[2]}
@@ -184,9 +175,9 @@ async def test_every_editor_lists_who_is_in_a_graph_wherever_it_is_open(
         cookie = "; ".join(f"{name}={value}" for name, value in browser.cookies.items())
         async with editors[1].socket(graph, cookie=cookie, **origin) as socket:
             await socket.send_bytes(bytes([1, 6, 1, 7, 1, 2]) + b"{}")  # presence: client 7, {}
-            await until(lambda: listed() == [["Kadri"], ["Kadri"], ["Kadri"]])
+            await wait_until(lambda: listed() == [["Kadri"], ["Kadri"], ["Kadri"]])
             assert found() == 3
-    await until(lambda: listed() == [[], [], []])
+    await wait_until(lambda: listed() == [[], [], []])
 
 
 async def test_asking_for_graphs_that_do_not_exist_leaves_nothing(
@@ -211,83 +202,6 @@ async def test_asking_for_graphs_that_do_not_exist_leaves_nothing(
                 pass
         assert refused.value.response.status_code == 404
     assert rows() == ["0", "0", "0"]
-
-
-class Stubborn:
-    """A stock client that connects again to its editor, or to the next one, whatever happens, and counts what
-    it wrote."""
-
-    def __init__(self, name: str, editors: list[OneOfSeveral], first: int, graph: str) -> None:
-        self.doc = Doc[Any]()
-        self.written: set[str] = set()
-        self._name = name
-        self._editors = editors
-        self._at = first
-        self._graph = graph
-        self._things = self.doc.get("meta", type=Map)
-        self._task = asyncio.create_task(self._stay_connected())
-
-    def write(self) -> None:
-        """Write something under a key of its own."""
-        key = f"x/{self._name}-{len(self.written)}"
-        self.written.add(key)
-        self._things[key] = float(len(self.written))
-
-    def has(self, keys: set[str]) -> bool:
-        """Return whether it has all of these keys."""
-        return keys <= set(self._things)
-
-    async def _stay_connected(self) -> None:
-        while True:
-            editor = self._editors[self._at % len(self._editors)]
-            with contextlib.suppress(Exception):
-                async with (
-                    asyncio.timeout(_GIVE_UP_S),
-                    editor.socket(self._graph) as session,
-                ):
-                    await self._serve(session)
-            self._at += 1
-            await asyncio.sleep(0.3)
-
-    async def _serve(self, session: Any) -> None:
-        """Speak the protocol of stock clients until the socket ends, or is silent for too long."""
-        sent: list[bytes] = []
-        news = asyncio.Event()
-
-        def hear(event: Any) -> None:
-            sent.append(event.update)
-            news.set()
-
-        async def tell() -> None:
-            while True:
-                await news.wait()
-                news.clear()
-                while sent:
-                    await session.send_bytes(create_update_message(sent.pop(0)))
-
-        subscription = self.doc.observe(hear)
-        telling = asyncio.create_task(tell())
-        try:
-            await session.send_bytes(create_sync_message(self.doc))
-            while not telling.done():
-                message = await session.receive_bytes(timeout=_SILENT_S)
-                if message[0] == YMessageType.SYNC:
-                    answer = handle_sync_message(message[1:], self.doc)
-                    if answer is not None:
-                        await session.send_bytes(answer)
-        finally:
-            self.doc.unobserve(subscription)
-            telling.cancel()
-
-    async def aclose(self) -> None:
-        """Leave for good."""
-        self._task.cancel()
-        await asyncio.wait([self._task])
-
-
-#: Stock clients give a silent server up after 30 s; so do these, but sooner.
-_SILENT_S = 12.0
-_GIVE_UP_S = 3600.0
 
 
 async def lived_through(
@@ -323,7 +237,7 @@ async def lived_through(
     try:
         for graph, some in people.items():
             keys = set().union(*(each.written for each in some))
-            await until(lambda some=some, keys=keys: all(each.has(keys) for each in some), 90)
+            await wait_until(lambda some=some, keys=keys: all(each.has(keys) for each in some), 90)
             contents = [dict(each.doc.get("meta", type=Map)) for each in some]
             assert contents[0] == contents[1] == contents[2]
             assert await replayed(database, graph) == contents[0]
@@ -371,9 +285,9 @@ async def test_nothing_is_lost_or_doubled_when_an_editor_is(
                     victim.begin()
                     await asyncio.to_thread(victim.wait)
                 case "frozen":
-                    victim.send(signal.SIGSTOP)
-                    await asyncio.sleep(FROZEN_S)
-                    victim.send(signal.SIGCONT)
+                    victim.process.send_signal(signal.SIGSTOP)
+                    await asyncio.sleep(_FROZEN_S)
+                    victim.process.send_signal(signal.SIGCONT)
                 case _:
                     assert await asyncio.to_thread(victim.end) in {0, -signal.SIGTERM}
                     victim.begin()
@@ -387,7 +301,7 @@ def test_an_editor_with_another_token_is_refused(
 ) -> None:
     stranger = OneOfSeveral(tmp_path / "data", editors[0].database, 9)
     stranger.begin(ACTION_ASSISTANT_TOKEN="another-token-" + "0123456789abcdef" * 2)
-    assert stranger.child.wait(60) != 0
+    assert stranger.process.wait(60) != 0
     assert (
         "has another token. All editors of one database need the same token"
         in stranger.log.read_text()
@@ -403,11 +317,11 @@ def test_an_editor_with_another_data_folder_is_refused(
         shutil.copytree(editors[0].data, data)
     stranger = OneOfSeveral(data, editors[0].database, 9)
     stranger.begin()
-    assert stranger.child.wait(60) != 0
+    assert stranger.process.wait(60) != 0
     said = stranger.log.read_text()
     assert f"does not find {data}/" in said
     assert "All editors of one database need the same data folder" in said
-    assert all(each.child.poll() is None for each in editors)
+    assert all(each.process.poll() is None for each in editors)
 
 
 async def test_an_ended_session_is_out_at_every_editor_also_without_the_database(

@@ -1,7 +1,7 @@
 """Several editors on one Postgres agree who owns a stream, whoever dies, freezes or is cut off."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 
 import pytest
@@ -13,6 +13,7 @@ from action_assistant.journal.events import Addition, Draft, nothing
 from action_assistant.journal.journal import Journal
 from editor.cluster.several import have_begun
 from journal.servers import Server
+from support.waiting import wait_until
 
 STREAM = "graph/g"
 
@@ -66,13 +67,6 @@ async def editors(database: str) -> AsyncIterator[tuple[Editor, Editor]]:
     async with AsyncExitStack() as stack:
         one = await stack.enter_async_context(editor(database, "one"))
         yield one, await stack.enter_async_context(editor(database, "two"))
-
-
-async def until(holds: Callable[[], bool]) -> None:
-    """Wait until something holds."""
-    async with asyncio.timeout(20):
-        while not holds():  # noqa: ASYNC110 - nothing tells it
-            await asyncio.sleep(0.02)
 
 
 async def test_who_comes_first_owns_a_stream_and_the_others_are_told_where_it_is(
@@ -138,7 +132,7 @@ async def test_a_crash_frees_the_streams_at_once(
     assert await one.epoch() == 1
     await one.journal.close()  # the beats go on; nobody holds the slot
     assert await two.epoch() == 2
-    await until(lambda: one.lost == [STREAM])
+    await wait_until(lambda: one.lost == [STREAM])
 
 
 async def test_an_editor_whose_session_was_cut_takes_a_slot_again_and_goes_on(
@@ -174,7 +168,7 @@ async def test_an_editor_that_drains_keeps_what_it_has_until_another_needs_it_an
     with pytest.raises(Unavailable, match="ending"):
         await one.owners.owner("graph/other")
     assert await two.epoch() == 2
-    await until(lambda: one.lost == [STREAM])
+    await wait_until(lambda: one.lost == [STREAM])
     assert await one.owners.owner(STREAM) == Elsewhere("http://two")
 
 
@@ -185,7 +179,7 @@ async def test_an_editor_that_the_database_does_not_hear_closes_its_rooms_and_go
     assert await one.epoch() == 1
     postgres.stop()
     try:
-        await until(lambda: one.lost == [STREAM])
+        await wait_until(lambda: one.lost == [STREAM])
         with pytest.raises(Unavailable, match="which editor has this graph"):
             await one.owners.owner(STREAM)
     finally:

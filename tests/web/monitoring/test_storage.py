@@ -1,6 +1,6 @@
 """Room on disks, looked at again and again: what goes wrong there is told, and ends nothing."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +9,7 @@ import pytest
 
 from action_assistant.web.monitoring import storage
 from action_assistant.web.monitoring.storage import StorageWatch
-
-
-async def until(seen: Callable[[], bool]) -> None:
-    """Wait for it."""
-    for _ in range(2_000):
-        if seen():
-            return
-        await anyio.sleep(0.01)
-    raise AssertionError("it was never so")
+from support.waiting import wait_until
 
 
 async def test_a_failed_check_is_repeated_and_shows_no_old_values(
@@ -41,13 +33,13 @@ async def test_a_failed_check_is_repeated_and_shows_no_old_values(
     watch = StorageWatch(tmp_path, database, {"archive": tmp_path}, counted, backups=False)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(watch.run)
-        await until(lambda: watch.found is not None)
+        await wait_until(lambda: watch.found is not None)
         fails, before = True, looked
-        await until(lambda: looked >= before + 3)
+        await wait_until(lambda: looked >= before + 3)
         assert watch.found is None
         assert list(watch.families()) == []
         fails = False
-        await until(lambda: watch.found is not None)
+        await wait_until(lambda: watch.found is not None)
         tasks.cancel_scope.cancel()
     assert "nobody thought of this" in caplog.text
     assert "folders were not counted" in caplog.text
