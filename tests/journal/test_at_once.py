@@ -5,7 +5,7 @@ import math
 import sqlite3
 import threading
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
@@ -20,23 +20,28 @@ from action_assistant.journal.events import Addition, Draft, Event, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
 from support.doses import examples
+from support.waiting import wait_until
 
 SMALL, LARGE = Draft("small.v1", "ada", b"x"), Draft("large.v1", "ada", bytes(100_000))
 
 
 class Watched:
-    """A journal, and on which thread each of its commits was done; `delay`: of the next ones, seconds."""
+    """A journal, and on which thread each of its commits was done. `delay`: of the next ones, seconds;
+    `may_store`: they wait until it is set."""
 
     def __init__(self, journal: Journal) -> None:
         self.journal = journal
         self.here: list[bool] = []
         self.delay = 0.0
+        self.may_store = threading.Event()
+        self.may_store.set()
         self.broken: list[Exception] = []
 
     def store(self, original: Any) -> Any:
         def stored(session: SqliteSession, *values: Any) -> None:
             self.here.append(threading.current_thread() is threading.main_thread())
             time.sleep(self.delay)
+            assert self.may_store.wait(60)
             if self.broken:
                 raise self.broken.pop()
             original(session, *values)
@@ -70,13 +75,6 @@ async def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
     await journal.close()
 
 
-async def until(happened: Callable[[], bool]) -> None:
-    """Wait for something."""
-    async with asyncio.timeout(10):
-        while not happened():  # noqa: ASYNC110 - nobody tells
-            await asyncio.sleep(0.01)
-
-
 async def known(watched: Watched) -> None:
     """Append until commits count as quick."""
     for _ in range(20):
@@ -104,9 +102,10 @@ async def test_the_thread_commits_large_work_and_other_work_than_appends(watched
 
 async def test_appends_that_come_while_the_thread_writes_wait_their_turn(watched: Watched) -> None:
     await known(watched)
-    watched.delay = 0.2
+    watched.may_store.clear()
     slow = asyncio.create_task(watched.journal.append("a", [SMALL]))
-    await asyncio.sleep(0.05)
+    await wait_until(lambda: watched.here)
+    asyncio.get_running_loop().call_soon(watched.may_store.set)
     assert await watched.then(SMALL) == 22
     assert await slow == 21
     assert watched.here == [False, False]
@@ -120,10 +119,10 @@ async def test_results_of_the_thread_are_reported_before_those_of_the_loop(
     journal = watched.journal
     watched.delay = 0.1
     journal.append_then(Addition("a", (LARGE,)), lambda *_: told.append("first"))
-    await asyncio.sleep(0.01)  # the thread has it
+    await wait_until(lambda: watched.here)  # the thread has it
     journal.append_then(Addition("a", (SMALL,)), lambda *_: told.append("second"))
     time.sleep(0.3)  # noqa: ASYNC251 - the thread is done with it while nobody can be told
-    await until(lambda: len(told) == 2)
+    await wait_until(lambda: len(told) == 2)
     assert told == ["first", "second"]
 
 

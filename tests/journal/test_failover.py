@@ -8,7 +8,6 @@ import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 
-import psutil
 import pytest
 
 from action_assistant.errors import CannotStart, Unavailable
@@ -18,6 +17,8 @@ from action_assistant.journal.failover import Failover, Primary
 from journal.proxy import proxy
 from journal.servers import Replica, Server, binaries, server
 from journal.test_postgres import draft, opened
+from support.product import frozen
+from support.waiting import wait_until
 
 NOBODY = "127.0.0.1:1"  # where nothing listens
 
@@ -140,9 +141,14 @@ async def test_a_commit_whose_wait_for_the_replica_was_cancelled_is_not_acknowle
     await journal.append("a", [draft("both have it")])
     replica.freeze()
     waiting = asyncio.create_task(journal.append("a", [draft("one has it")]))
-    await asyncio.sleep(0.5)
-    primary.sql("SELECT pg_cancel_backend(pid) FROM pg_stat_activity WHERE wait_event = 'SyncRep'")
-    await asyncio.sleep(1)
+
+    def who_waits() -> str:
+        return primary.ask("SELECT pid FROM pg_stat_activity WHERE wait_event = 'SyncRep'")
+
+    await wait_until(who_waits)
+    pid = who_waits()
+    primary.sql(f"SELECT pg_cancel_backend({pid})")
+    await wait_until(lambda: who_waits() not in {"", pid})  # it asks again, by another connection
     assert not waiting.done()
     replica.thaw()
     assert await waiting == 2
@@ -181,9 +187,12 @@ async def test_writer_and_readers_leave_an_old_primary(
         STATE["timeline"] = 2
         if old == "is frozen":
             for each in primary.processes():
-                ending.enter_context(stopped(each))
+                ending.enter_context(frozen(each))
         way.delay = delay
-        await asyncio.sleep(1)
+        # The watch ends when it has heard of the new primary.
+        await wait_until(
+            lambda: "failover watch" not in {each.name for each in threading.enumerate()}
+        )
         async with asyncio.timeout(20):
             while True:
                 with contextlib.suppress(Unavailable):
@@ -194,16 +203,6 @@ async def test_writer_and_readers_leave_an_old_primary(
             bodies = [each.body for each in await journal.read("a")]
         assert bodies == [b"both have it", b"the new one has it"]
         assert replica.ask("SELECT count(*) FROM event", "aa") == "2"
-
-
-@contextlib.contextmanager
-def stopped(process: psutil.Process) -> Iterator[None]:
-    """Let a process stand still inside the block."""
-    process.suspend()
-    try:
-        yield
-    finally:
-        process.resume()
 
 
 @pytest.mark.parametrize("query", ["failover=synchronous", f"host={NOBODY}"])
@@ -221,14 +220,14 @@ async def test_a_primary_that_waits_for_no_replica_is_refused(postgres: Server, 
 async def test_a_server_that_is_silent_takes_no_time_of_the_others(postgres: Server) -> None:
     """One host is down, another accepts connections and never answers, as a frozen one does."""
     name = postgres.new_database().rpartition("/")[2]
-    frozen = socket.create_server(("127.0.0.1", 0))
-    port = frozen.getsockname()[1]
+    silent = socket.create_server(("127.0.0.1", 0))
+    port = silent.getsockname()[1]
     hosts = [NOBODY, f"127.0.0.1:{port}", f"127.0.0.1:{postgres.port}"]
     database = database_of(f"postgresql://aa@/{name}?" + "&".join(f"host={each}" for each in hosts))
     async with asyncio.timeout(4):  # less than one of them may take
         assert await database.ask(lambda each: each.exec_driver_sql("SELECT 7").scalar()) == 7
     await database.close()
-    frozen.close()
+    silent.close()
 
 
 async def test_servers_that_cannot_be_written_are_named() -> None:

@@ -4,7 +4,7 @@ import asyncio
 import os
 import random
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from sqlalchemy import insert
@@ -18,6 +18,7 @@ from action_assistant.schema import editor_tables
 from journal.proxy import Verdict, proxy
 from journal.servers import Server, binaries, server
 from journal.whole_log import whole_log
+from support.waiting import wait_until
 
 STOPS = int(os.environ.get("SOAK_STOPS", "6"))
 CUTS = int(os.environ.get("SOAK_CUTS", "24"))
@@ -29,13 +30,6 @@ def draft(text: str = "x") -> Draft:
 
 async def opened(url: str) -> Journal:
     return await Journal.open(url, branch="editor", fold=nothing)
-
-
-async def until(done: Callable[[], bool], within: float = 20) -> None:
-    """Wait for something that nobody tells."""
-    async with asyncio.timeout(within):
-        while not done():  # noqa: ASYNC110
-            await asyncio.sleep(0.01)
 
 
 @pytest.fixture
@@ -76,7 +70,7 @@ class Writers:
     async def go_on(self, more: int = 1, within: float = 20) -> None:
         """Wait until so many more were acknowledged."""
         wanted = len(self.acknowledged) + more
-        await until(lambda: len(self.acknowledged) >= wanted, within)
+        await wait_until(lambda: len(self.acknowledged) >= wanted, within)
 
     async def end(self) -> None:
         self._enough = True
@@ -228,7 +222,7 @@ async def test_cuts_anywhere_under_load_lose_nothing_and_double_nothing(postgres
         journal = await opened(url.replace(f":{postgres.port}/", f":{way.port}/"))
         writing = Writers(journal, writers=6)
         calm = False
-        await until(lambda: way.cuts >= CUTS, within=20 + CUTS)
+        await wait_until(lambda: way.cuts >= CUTS, seconds=60 + CUTS)
         calm = True
         await writing.end()
         await writing.check()
@@ -244,7 +238,7 @@ async def test_a_server_that_forgets_commits_is_refused(
 ) -> None:
     mortal.sql(f"ALTER SYSTEM SET {setting}")
     mortal.sql("SELECT pg_reload_conf()")
-    await asyncio.sleep(0.3)
+    await wait_until(lambda: mortal.ask(f"SHOW {setting.split()[0]}") == "off")
     with pytest.raises(CannotStart, match=says):
         await opened(mortal.url("aa"))
 
