@@ -198,6 +198,14 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
   await expect(page.getByRole("row", { name: /Wait 1/ })).toContainText("here they part");
 });
 
+test("a comparison of no runs leads to the list of runs", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/compare`);
+  await expect(page.getByRole("heading", { name: "Which runs?" })).toBeVisible();
+  await page.getByRole("link", { name: "Open the list of runs" }).click();
+  await expect(page.getByRole("row").filter({ hasText: "chain_3" }).first()).toBeVisible();
+});
+
 test("on a phone nothing that marks the parting lies over a card, a time or the edge", async () => {
   const { page } = ada;
   const graphs = await product.ask<{ id: string; name: string }[]>("/api/graphs");

@@ -302,6 +302,19 @@ export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode })
       })}
       <main className="page">
         {isPhone && actions && <div className={style.tools}>{actions}</div>}
+        {b === "" && (
+          <Empty
+            icon={<IconArrowsDiff size={22} />}
+            title="Which runs?"
+            action={
+              <Button component={Link} variant="default" to="/runs">
+                Open the list of runs
+              </Button>
+            }
+          >
+            Choose two in the list, or open one and press <b>Compare</b>.
+          </Empty>
+        )}
         {a === "" && runner !== undefined && b !== "" && (
           <Choose key={b} runner={runner} b={b} asked={query.has("choose")} />
         )}
