@@ -195,6 +195,24 @@ test("changes by others advance the moment and are not counted as one's own", ()
   expect(keys(room.doc)).toEqual(["theirs"]);
 });
 
+test("what has come from the room is not encoded again, and an edit that answers it is sent", () => {
+  server.accept();
+  const encoded: (readonly [own: boolean, boolean])[] = [];
+  room.doc.on("afterTransactionCleanup", ({ local }: Y.Transaction, doc: Y.Doc) => {
+    encoded.push([local, doc._observers.has("update")]);
+  });
+  room.doc.on("afterTransaction", ({ local }: Y.Transaction) => {
+    if (!local) write("answer");
+  });
+  server.broadcast((doc) => write("theirs", doc));
+  expect(encoded).toEqual([
+    [false, false],
+    [true, true],
+  ]);
+  expect(keys(server.doc)).toEqual(["answer", "theirs"]);
+  expect(room.link()).toMatchObject({ state: "live", unsaved: 0 });
+});
+
 test.each([
   [4401, "session-ended"],
   [4403, "forbidden"],

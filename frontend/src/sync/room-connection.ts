@@ -94,7 +94,7 @@ class Connection implements Room, SocketHandler {
     this.address = options.url;
     this.replaced = new ReplacedValues(this.doc, this);
     this.changedTwice = new ChangedTwiceStore(this.doc);
-    this.doc.on("update", this.onUpdate);
+    this.doc.on("afterTransaction", this.onTransaction);
     this.awareness.on("update", this.onAwareness);
     this.fingerprintCheck = new FingerprintCheck(this.doc, this.atRest);
     this.socket = new ReconnectingSocket(
@@ -149,6 +149,7 @@ class Connection implements Room, SocketHandler {
     if (this.closed) return;
     this.awareness.setLocalState(null);
     this.closed = true;
+    this.doc.off("afterTransaction", this.onTransaction);
     this.doc.off("update", this.onUpdate);
     this.awareness.off("update", this.onAwareness);
     this.replaced.close();
@@ -436,13 +437,18 @@ class Connection implements Room, SocketHandler {
     });
   }
 
+  /** Listens to updates of all transactions but those from the room: Yjs would encode these for nobody. */
+  private readonly onTransaction = ({ origin }: Y.Transaction): void => {
+    if (origin === this) this.doc.off("update", this.onUpdate);
+    else this.doc.on("update", this.onUpdate);
+  };
+
   private readonly onUpdate = (
     update: Uint8Array,
-    origin: unknown,
+    _origin: unknown,
     _doc: Y.Doc,
     transaction: Y.Transaction,
   ): void => {
-    if (origin === this) return;
     if (transaction.local) {
       const edit = madeNow(update, this.replaced.take());
       this.persistence?.edited(edit);

@@ -21,6 +21,7 @@ import {
   usePeople,
   useRoom,
   useStrandedEdits,
+  useThrottledLink,
   useUndo,
 } from "./use-room";
 
@@ -165,6 +166,15 @@ const leave = async () => {
   await flush();
 };
 
+let states: string[];
+
+function States() {
+  const { state, seq } = useThrottledLink();
+  useUndo();
+  states.push(`${state} ${seq}`);
+  return null;
+}
+
 const ADA = { id: "a", name: "Ada" };
 const MARI = { id: "m", name: "Mari" };
 
@@ -182,6 +192,27 @@ test("a page knows who edits a field, where somebody looks, and whose edits wait
   expect(text()).toBe("live 0 Mari Mari:1 at 7");
   await heard(() => server.presence(5, 2, null));
   expect(text()).toBe("live 0 Mari:1");
+});
+
+test("an editor is not drawn again when all that is new is that its edits are kept", async () => {
+  states = [];
+  vi.stubGlobal("fetch", async () => Response.json({ person: ADA }));
+  const keep = { graph: "g", person: ADA, device: new FakeEditStore() };
+  act(() =>
+    root.render(
+      <RoomProvider url="ws://host/room" keep={keep}>
+        <Together />
+        <States />
+      </RoomProvider>,
+    ),
+  );
+  await flush();
+  await heard(() => open.room.reconnect());
+  expect(open.room.link().kept).toBe(true);
+  expect(states).toEqual(["connecting 0"]);
+  await heard(() => void server.accept());
+  await flush();
+  expect(states.at(-1)).toBe("live 0");
 });
 
 test("edits of another person on this device can be read and dropped, and are never sent", async () => {

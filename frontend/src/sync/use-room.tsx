@@ -156,11 +156,18 @@ export function useLink(): RoomLink {
   return useSyncExternalStore(onLink, room.link);
 }
 
-/** The link, as old as the calm graph where only its place in the log is another. */
-export function useThrottledLink(): RoomLink {
+/** The link, as old as the calm graph where only its place in the log is another; without what is kept here. */
+export function useThrottledLink(): Omit<RoomLink, "kept"> {
   const { room, throttled: calm } = useRoom();
-  return useSyncExternalStore(calm.onLink, room.link);
+  const last = useRef<Omit<RoomLink, "kept">>(NO_LINK);
+  return useSyncExternalStore(calm.onLink, () => {
+    const { kept, ...now } = room.link();
+    if (!isEqual(now, last.current)) last.current = now;
+    return last.current;
+  });
 }
+
+const NO_LINK: RoomLink = { state: "connecting", unsaved: 0, seq: 0 };
 
 /** Return a part of the link; draws again only when it is another. */
 export function useLinkPart<T>(part: (link: RoomLink) => T): T {
@@ -344,7 +351,10 @@ export function useUndo(): { readonly canUndo: boolean; readonly canRedo: boolea
   const { undo } = useRoom();
   const [can, setCan] = useState({ canUndo: false, canRedo: false });
   useEffect(() => {
-    const look = () => setCan({ canUndo: undo.canUndo(), canRedo: undo.canRedo() });
+    const look = () => {
+      const now = { canUndo: undo.canUndo(), canRedo: undo.canRedo() };
+      setCan((before) => (isEqual(before, now) ? before : now));
+    };
     const events = ["stack-item-added", "stack-item-popped"] as const;
     for (const event of events) undo.on(event, look);
     look();
