@@ -340,6 +340,9 @@ function Gone() {
   );
 }
 
+/** Memoized, since the screen reads the list of actions. */
+const StillInside = memo(Inside);
+
 /** Links and copies on the device know an id, and not whether it is a graph's or an action's. */
 function useIsAction(id: string): boolean {
   return useKnownActions().actions.some(({ document }) => document === id);
@@ -357,7 +360,7 @@ export function GraphScreen({ id }: { id: string }): ReactNode {
         fallback={<PageBar crumbs={[{ label: "Graphs", to: "/" }]} />}
       >
         <EditorStoreProvider>
-          <Inside id={id} />
+          <StillInside id={id} />
         </EditorStoreProvider>
       </RoomProvider>
     </PageFrame>

@@ -96,8 +96,10 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
       )}
       {data.lead && pill && (
         <Pill
-          {...{ id, line, pill }}
-          data={line.lean ? leanData(data) : data}
+          {...{ id, data }}
+          x={pill[0]}
+          y={pill[1]}
+          lean={line.lean === true}
           selected={selected === true}
         />
       )}
@@ -106,18 +108,21 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
   );
 });
 
-/** Return what a pill shows where there is room for outcomes and response only. */
-const leanData = (data: ArrowData): ArrowData => ({ ...data, mark: null, hand: null });
-
 interface BundleProps {
   id: string;
   data: ArrowData;
-  line: RoutedLine;
-  pill: Point | null;
   selected: boolean;
 }
 
-function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { opened: boolean }) {
+interface LineProps extends BundleProps {
+  line: RoutedLine;
+  pill: Point | null;
+  opened: boolean;
+}
+
+// Memoized with the pill, since React Flow renders an arrow again when it has measured its cards.
+const BundleLine = memo(function BundleLine(props: LineProps) {
+  const { id, data, line, pill, selected, opened } = props;
   const change = useChangeMark(data.relation)?.change;
   const tone = change ?? toneOf(data);
   const lit = data.lit || data.came !== null;
@@ -141,7 +146,7 @@ function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { 
       />
     </>
   );
-}
+});
 
 /**
  * Added lines are solid, removed ones dashed, and changed ones double: this style paints the gap in
@@ -153,8 +158,15 @@ const CHANGED_LINES = {
   changed: { stroke: "var(--canvas)", strokeWidth: 1.6, strokeDasharray: "none" },
 } as const;
 
+interface PillProps extends BundleProps {
+  x: number;
+  y: number;
+  /** There is room for outcomes and response only. */
+  lean: boolean;
+}
+
 /** Shows outcomes and response of a bundle. Screen readers get the same from the label of the arrow. */
-function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point }) {
+const Pill = memo(function Pill({ id, data, x, y, lean, selected }: PillProps) {
   const store = useStoreApi();
   const editing = use(LineEditingContext);
   const [dragged, setDragged] = useState<DraggedOutcome | null>(null);
@@ -180,7 +192,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           {change && <ChangeSign mark={change} />}
           <SinceSpot of={data.relation} on="arrow" />
           {(data.answers ?? data.entry) && <BreakpointSpot of={data.relation} on="arrow" />}
-          {data.mark && (
+          {data.mark && !lean && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
             <span className={style.mark} onClick={() => store.getState().addSelectedEdges([id])}>
@@ -194,7 +206,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           ) : (
             glyphs
           )}
-          {data.hand && (
+          {data.hand && !lean && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
             <span className={style.mark} onClick={() => store.getState().addSelectedEdges([id])}>
@@ -216,7 +228,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
       </EdgeLabelRenderer>
     </>
   );
-}
+});
 
 interface GlyphsProps {
   outcomes: readonly Outcome[];

@@ -131,6 +131,7 @@ function PaneInFlow(props: Props) {
   const { selection, select, folded } = context;
   const canvas = useCanvasElements({
     graph: first.pending ? EMPTY_GRAPH : context.graph,
+    awaited: !arrived && context.graph.actions.length === 0,
     ...{ selection, select, folded, marks, alone: isPast === true },
     progress: context.dryRun?.sighting.progress ?? progress,
     laidOut: first.places,

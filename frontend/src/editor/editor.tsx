@@ -11,7 +11,7 @@ import {
   useState,
 } from "react";
 import { useSearch } from "wouter";
-import { useListedName } from "../api/graph-list";
+import { useListedName } from "../api/graph-names";
 import { NameOfGraph } from "../canvas/editor-store";
 import { addressAround, levelsOf } from "../canvas/level-path";
 import { FoldFrameContext, type NoteLinks, NoteLinksContext } from "../canvas/notes/note-buttons";
@@ -394,11 +394,12 @@ function placeAction(context: EditorContext, template: NewAction): boolean {
 }
 
 /** Loads panels early whose keyboard shortcuts may be followed by typing at once; the cards come before. */
-function usePreloaded(drawn: boolean): void {
+const Preloads = memo(function Preloads({ drawn }: { drawn: boolean }) {
   useOnceIdle(drawn, () => {
     for (const part of [Inspector, QuickAdd, FindBar]) void part.preload();
   });
-}
+  return null;
+});
 
 export function Editor(props: Props) {
   const { id, known, progress } = props;
@@ -421,7 +422,6 @@ export function Editor(props: Props) {
   useRemoteEditAnnouncements(context.graph, drawn);
   useRunAnnouncements(context.graph, progress);
   useShortcuts(context);
-  usePreloaded(drawn);
   useSeededDryRun(context, props.seed);
 
   const place = (template: NewAction) => {
@@ -497,6 +497,7 @@ export function Editor(props: Props) {
       <AfterFirstView>
         <RoomNotices />
       </AfterFirstView>
+      <Preloads drawn={drawn} />
       <Later drawn={drawn}>
         <LateParts />
       </Later>

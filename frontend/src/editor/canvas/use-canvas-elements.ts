@@ -72,6 +72,8 @@ interface Drawn {
 
 interface CanvasElementsInput {
   graph: Graph;
+  /** True before the graph has arrived: nothing stands on the canvas, not even entry and exit. */
+  awaited: boolean;
   selection: ReadonlySet<string>;
   select: (ids: Iterable<string>) => void;
   progress: ReadonlyMap<Key, Progress>;
@@ -85,6 +87,7 @@ interface CanvasElementsInput {
 }
 
 const NOBODY: readonly Participant[] = [];
+const NO_NODES: CanvasNode[] = [];
 
 /** Return the places of all elements, including the drags of others and of this person (`own`). */
 export function dragged(
@@ -381,7 +384,8 @@ export function useCanvasElements(given: CanvasElementsInput) {
   const handlers = { onNodesChange, onEdgesChange, ...useDragging(placed, over, setOver, setDrag) };
   const view = { ...spread, places: drawnPlaces, sizes: spread.sizesOf(known) };
   const stands = { folding, places, sizes: known };
-  return { flow, lines, ...drawn, ...stands, view, setResized, setOver, ...handlers };
+  const elements = given.awaited ? { nodes: NO_NODES, edges: drawn.edges } : drawn;
+  return { flow, lines, ...elements, ...stands, view, setResized, setOver, ...handlers };
 }
 
 /** Return whether the dragged elements are one action without arrows, which can be inserted into an arrow. */

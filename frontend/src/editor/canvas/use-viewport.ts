@@ -1,7 +1,7 @@
 /** The view of the canvas: its first view, Fit, showing single actions, and following a run. */
 
 import type { ReactFlowInstance } from "@xyflow/react";
-import { type RefObject, useCallback, useEffect, useMemo, useRef } from "react";
+import { type RefObject, useCallback, useEffect, useLayoutEffect, useMemo, useRef } from "react";
 import type { LineStore } from "../../canvas/arrows/line-store";
 import type { PlaceMap } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode, Folding } from "../../canvas/elements";
@@ -185,6 +185,11 @@ export function useViewport(given: ViewportInput) {
   // is remembered.
   const opened = useRef(false);
   const asked = useRef<Goal>("first");
+  // By sizes that are expected: else cards are drawn that nobody sees then, and these only later.
+  useLayoutEffect(() => {
+    const view = begun && !opened.current ? viewOf(asked.current) : null;
+    if (view !== null) void flow.setViewport(view);
+  }, [begun, flow, viewOf]);
   useEffect(() => {
     if (!begun || opened.current) return;
     const timer = setTimeout(() => {
