@@ -5,7 +5,7 @@ import { notifications } from "@mantine/notifications";
 import { IconDownload, IconFileSearch, IconSearch } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { useGraphNames } from "../api/graph-list";
+import { useGraphNames } from "../api/graph-names";
 import { useLive } from "../api/page-link";
 import { currentName, useKnownPeople, useMay, usePerson } from "../api/people";
 import { useSiteChoice } from "../status/site-choice";

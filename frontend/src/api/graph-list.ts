@@ -1,18 +1,8 @@
-/** The list of graphs by pages, as the server sorts and searches it; and all names and labels. */
-import {
-  type InfiniteData,
-  keepPreviousData,
-  type QueryClient,
-  useInfiniteQuery,
-  useQuery,
-  useQueryClient,
-} from "@tanstack/react-query";
+/** The list of graphs by pages, as the server sorts and searches it; and the labels. */
+import { keepPreviousData, useInfiniteQuery, useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
 import { editor } from "./client";
 import { type GraphSummary, queryKeys } from "./graphs";
-import type { EditorApi } from "./schema/editor";
-
-export type GraphName = EditorApi["GraphName"];
 
 const PAGE = 60; // graphs: a few screens of cards
 const AGAIN = 8_000; // ms
@@ -31,7 +21,7 @@ export interface GraphsWanted {
   readonly first?: readonly string[];
 }
 
-interface GraphPage {
+export interface GraphPage {
   readonly graphs: readonly GraphSummary[];
   readonly total: number;
 }
@@ -106,16 +96,6 @@ export function useGraphPages(wanted: GraphsWanted): GraphPages {
   };
 }
 
-/** Return the name of a graph in the lists that the page has loaded; undefined if it is in none. */
-export function useListedName(id: string): string | undefined {
-  const client = useQueryClient();
-  return useMemo(() => {
-    const lists = client.getQueriesData<InfiniteData<GraphPage>>({ queryKey: queryKeys.pages });
-    const all = lists.flatMap(([, data]) => data?.pages?.flatMap(({ graphs }) => graphs) ?? []);
-    return all.find((graph) => graph.id === id)?.name;
-  }, [client, id]);
-}
-
 /**
  * The graphs with these ids (200 at most) as lists show them, without those that are gone; asked for again all the
  * time.
@@ -130,21 +110,6 @@ export function useSomeGraphs(ids: readonly string[]) {
     refetchInterval: AGAIN,
     select: ({ graphs }) => graphs,
   });
-}
-
-const namesQuery = {
-  queryKey: queryKeys.names,
-  queryFn: ({ signal }: { signal?: AbortSignal }) => editor.get("/api/graphs/names", { signal }),
-} as const;
-
-/** The names of all graphs, sorted. */
-export function useGraphNames() {
-  return useQuery(namesQuery);
-}
-
-/** Return the names of all graphs as they are now. */
-export function fetchGraphNames(client: QueryClient): Promise<readonly GraphName[]> {
-  return client.fetchQuery({ ...namesQuery, staleTime: 0, retry: false });
 }
 
 /** The labels of the graphs in a folder and those inside of it; "" for all graphs. */

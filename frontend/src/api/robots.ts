@@ -1,5 +1,5 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
-import { useQueries, useQuery } from "@tanstack/react-query";
+import { useQuery } from "@tanstack/react-query";
 import { runnerAt, runnerOnlyAt } from "./client";
 import { fetchText } from "./http";
 import type { RunnerApi } from "./schema/runner";
@@ -56,7 +56,7 @@ export function useFoundEngines(runner: string | undefined, on: boolean) {
   });
 }
 
-function indexedByRobot(runner: string | undefined, name: string, signal: AbortSignal) {
+export function indexedByRobot(runner: string | undefined, name: string, signal: AbortSignal) {
   return runnerAt(runner).get("/api/robots/{name}/known", { path: { name }, signal });
 }
 
@@ -66,23 +66,6 @@ export function useIndexedByRobot(runner: string | undefined, robot: string, on:
     queryFn: ({ signal }) => indexedByRobot(runner, robot, signal),
     enabled: on && runner !== undefined,
     refetchInterval: 10_000,
-  });
-}
-
-/** Query the indexes of several robots at once; null for robots that have not answered. */
-export function useIndexedByRobots(
-  runner: string | undefined,
-  robots: readonly string[],
-): readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[] {
-  return useQueries({
-    queries: robots.map((robot) => ({
-      queryKey: ["robots", "known", robot],
-      queryFn: ({ signal }: { signal: AbortSignal }) => indexedByRobot(runner, robot, signal),
-      enabled: runner !== undefined,
-      refetchInterval: 30_000,
-    })),
-    combine: (answers) =>
-      answers.map(({ data }, i) => ({ robot: robots[i] ?? "", indexed: data ?? null })),
   });
 }
 

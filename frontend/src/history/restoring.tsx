@@ -5,7 +5,7 @@ import { IconCopyPlus, IconRestore } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
-import { fetchGraphNames } from "../api/graph-list";
+import { fetchGraphNames } from "../api/graph-names";
 import { authorName, copyMoment, refreshGraphs, type Version } from "../api/graphs";
 import { type HistoryEntry, refreshHistory, restoreMoment, revertEdits } from "../api/history";
 import { errorText } from "../api/http";

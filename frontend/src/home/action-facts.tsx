@@ -2,7 +2,7 @@
 import { Menu } from "@mantine/core";
 import type { ReactElement } from "react";
 import { Link } from "wouter";
-import { useGraphNames } from "../api/graph-list";
+import { useGraphNames } from "../api/graph-names";
 import { useOpening } from "../ui/late-opening";
 import type { KnownAction } from "./known-actions";
 import style from "./sidebar.module.css";

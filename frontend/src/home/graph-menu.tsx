@@ -12,7 +12,7 @@ import {
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
 import { type ComponentProps, type ReactElement, useState } from "react";
 import { fileGraph } from "../api/folders";
-import { fetchGraphNames } from "../api/graph-list";
+import { fetchGraphNames } from "../api/graph-names";
 import {
   deleteGraph,
   duplicateGraph,

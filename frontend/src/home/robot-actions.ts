@@ -1,9 +1,10 @@
 /** Actions that robots have indexed: beside those of the library. */
+import { useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
 import type { GraphSummary } from "../api/graphs";
 import { importAction } from "../api/library";
 import { useLive } from "../api/page-link";
-import { type IndexedByRobot, indexedAction, useIndexedByRobots } from "../api/robots";
+import { type IndexedByRobot, indexedAction, indexedByRobot } from "../api/robots";
 import { flatName, pathOf } from "../graph/document-keys";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/field-words";
@@ -46,6 +47,23 @@ export function knowledgeOf(told: ToldByRobots): RobotsKnowledge {
     byName,
     graphs,
   };
+}
+
+/** Query the indexes of several robots at once; null for robots that have not answered. */
+function useIndexedByRobots(
+  runner: string | undefined,
+  robots: readonly string[],
+): readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[] {
+  return useQueries({
+    queries: robots.map((robot) => ({
+      queryKey: ["robots", "known", robot],
+      queryFn: ({ signal }: { signal: AbortSignal }) => indexedByRobot(runner, robot, signal),
+      enabled: runner !== undefined,
+      refetchInterval: 30_000,
+    })),
+    combine: (answers) =>
+      answers.map(({ data }, i) => ({ robot: robots[i] ?? "", indexed: data ?? null })),
+  });
 }
 
 export function useRobotsKnowledge(): RobotsKnowledge {

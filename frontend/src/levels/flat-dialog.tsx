@@ -7,7 +7,7 @@ import { Button, Group, Modal, Skeleton, TextInput } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { useGraphNames } from "../api/graph-list";
+import { useGraphNames } from "../api/graph-names";
 import { refreshGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import { type FlatGraph, type FlatteningReason, makeFlatGraph, useFlatGraph } from "../api/inside";

@@ -3,7 +3,7 @@
 import { Button } from "@mantine/core";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
-import { useGraphNames } from "../api/graph-list";
+import { useGraphNames } from "../api/graph-names";
 import type { LibraryAction } from "../api/library";
 import type { Parameter } from "../graph/model";
 import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../home/robot-actions";

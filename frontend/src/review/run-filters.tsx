@@ -12,7 +12,7 @@ import {
 import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
 import { IconAdjustmentsHorizontal, IconFilter, IconSearch, IconTrash } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
-import { useGraphNames } from "../api/graph-list";
+import { useGraphNames } from "../api/graph-names";
 import { useVersions, versionName } from "../api/graphs";
 import { CONDUCTED } from "../api/led-runs";
 import { filterOf, NO_FILTER, queryOf, type RunFilter, useLabels } from "../api/review";

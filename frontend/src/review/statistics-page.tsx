@@ -3,7 +3,7 @@ import { Select, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconChartBar } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { useGraphNames } from "../api/graph-list";
+import { useGraphNames } from "../api/graph-names";
 import { errorText } from "../api/http";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";

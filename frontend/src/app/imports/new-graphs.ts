@@ -3,7 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
 import { useLocation, useSearch } from "wouter";
-import { fetchGraphNames } from "../../api/graph-list";
+import { fetchGraphNames } from "../../api/graph-names";
 import { createGraph, refreshGraphs, refreshLibrary } from "../../api/graphs";
 import { errorText } from "../../api/http";
 
