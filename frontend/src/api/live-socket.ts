@@ -465,14 +465,36 @@ function withUnseenEnd(run: Run, now: number): Run {
   return { ...run, state: "unknown", unknown_since: since };
 }
 
-/** Throws an error if a message lacks what each robot and each run has. */
+const isObject = (part: unknown): part is object => typeof part === "object" && part !== null;
+const isText = (part: unknown) => part == null || typeof part === "string";
+
+/** Returns whether this is a list of objects with these texts. */
+function isListOf<T>(list: readonly T[], ...texts: readonly (keyof T)[]): boolean {
+  const isWhole = (part: T) =>
+    isObject(part) && texts.every((name) => typeof part[name] === "string");
+  return Array.isArray(list) && list.every(isWhole);
+}
+
+/** Throws an error if a message lacks what each robot and each run has: STOP and its notices read it. */
 function check(message: RunnerMessage): void {
   const { type } = message;
   const robots = type === "hello" || type === "engines" ? message.engines : [];
-  const runs = type === "hello" ? message.runs : type === "run" ? [message.run] : [];
+  const runs: Run[] = type === "hello" ? message.runs : type === "run" ? [message.run] : [];
   const isSound =
-    robots.every(({ name, holds }) => typeof name === "string" && Array.isArray(holds)) &&
-    runs.every(({ id, alarms }) => typeof id === "string" && Array.isArray(alarms));
+    isListOf(robots, "name") &&
+    robots.every(
+      ({ holds }) => isListOf(holds, "graph") && holds.every(({ run }) => isText(run)),
+    ) &&
+    isListOf(runs, "id") &&
+    runs.every(
+      ({ alarms, unconfirmed, actions, rests }) =>
+        isListOf(alarms, "code", "text") &&
+        isText(unconfirmed) &&
+        Object.values(actions ?? {}).every(isObject) &&
+        isListOf(rests ?? [], "robot") &&
+        (rests ?? []).every(({ why }) => isText(why)),
+    ) &&
+    (type !== "confirm" || isListOf(message.asked));
   if (!isSound) throw new TypeError("It lacks a part.");
 }
 

@@ -8,7 +8,7 @@ import { plain } from "../testing/texts";
 import { Wire, wireOf, wiresOf } from "../testing/wire";
 import { runnerAt } from "./client";
 import { SitesJoiner } from "./live-sites";
-import { type LiveState, openRuns, silentSites } from "./live-socket";
+import { foreignGraphs, type LiveState, openRuns, silentSites } from "./live-socket";
 import { RunnerSockets } from "./runner-sockets";
 import type { Run } from "./runs";
 import { shiftOfRun } from "./site-places";
@@ -251,6 +251,37 @@ test("a site that is named no longer and rests is gone, and one runner needs no 
   posted = [];
   live.stop("all");
   expect(stopped()).toEqual([A.url]);
+});
+
+test("a site whose words lack a part is mute, and takes neither STOP nor a notice from the others", async () => {
+  const failed = vi.spyOn(console, "error").mockImplementation(() => undefined);
+  live.setSites([A, B]);
+  live.setJoiner(new SitesJoiner());
+  const robot = (more: object) => ({ engines: [{ ...DORA, name: "Eve", ...more }], runs: [] });
+  const open = (more: object) => ({ engines: [], runs: [run("b", { number: 2, ...more })] });
+  const held = { graph: "g", active: true, run: null, stopping: null };
+  const odd = [
+    ...[[null], [{}], [{ ...held, run: 1 }], null].map((holds) => robot({ holds })),
+    ...[[null], [{ code: "moves_again" }], null].map((alarms) => open({ alarms })),
+    ...[{ unconfirmed: {} }, { actions: { Lift_0: null } }, { rests: [null] }].map(open),
+    open({ rests: [{ robot: "Eve", state: "unproven", why: 1 }] }),
+    { engines: [null], runs: [] },
+    { engines: [], runs: [null] },
+  ];
+  for (const said of odd) {
+    hello(A.url, run("a", { desired: "stopped", unconfirmed: "Lift_0 does not obey" }));
+    wireOf(B.url).say({ type: "hello", ...said });
+    const [, b] = live.state.sites ?? [];
+    expect([said, b?.state]).toMatchObject([said, { link: "down", unreached: { kind: "mute" } }]);
+    expect(foreignGraphs(live.state)).toEqual([]);
+    const notice = plain(wholeNotice(live.state, new Set(), performance.now() + 6_500)?.text);
+    expect(notice).toContain("STOP UNCONFIRMED at Hall A: run 1");
+    expect(notice).toContain("STOP CANNOT BE PROVEN HERE at Hall B");
+    live.redial();
+  }
+  wireOf(B.url).say({ type: "hello", ...robot({ holds: [held] }) });
+  expect(foreignGraphs(live.state)).toHaveLength(1);
+  failed.mockRestore();
 });
 
 test("a site whose clock is ahead makes nothing of the others older, and its own is as old as it is", async () => {
