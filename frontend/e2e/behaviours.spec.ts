@@ -74,7 +74,7 @@ test("one that cannot be run is said before the start, which is not offered then
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
   const looked = dialog.getByRole("region", { name: "Checks before the start" });
   await expect(looked.getByText("broken.py cannot be read: it is not UTF-8")).toBeVisible();
-  await expect(dialog.getByRole("button", { name: /^Run v1: Something/ })).toBeDisabled();
+  await expect(dialog.getByRole("button", { name: /^Run v1: A check prevents/ })).toBeDisabled();
   await dialog.getByRole("radio", { name: /^Simulated/ }).check();
   await expect(dialog.getByRole("button", { name: "Run v1 in the simulator" })).toBeEnabled();
 });

@@ -76,7 +76,7 @@ test("keys and marquee: Tab searches, all are selected, Delete deletes, a frame 
   await expect(page.locator(".react-flow__node-action")).toHaveCount(2);
 
   // A frame drawn round one of them selects that one.
-  await page.getByRole("button", { name: "Select", exact: true }).click();
+  await page.keyboard.press("v");
   const two = await boxOf(card(page, "Two"));
   await page.mouse.move(two.x - 14, two.y - 10);
   await page.mouse.down();
