@@ -94,16 +94,29 @@ export class SitesJoiner implements Joiner {
           .filter(({ simulated }) => i === 0 || !simulated)
           .map((robot) => this.#robotOf(robot, each)),
       ),
-      runs: new Map(
-        sites.flatMap((each) =>
-          [...each.state.runs].map(([id, run]) => [id, this.#runOf(run, each)]),
-        ),
-      ),
+      runs: this.#runsOf(sites),
       stops: joinedStops(sites),
       asked: sites.flatMap(({ state }) => state.asked),
       queue: joinedQueue(sites),
       sites: sites.map(({ site, state }) => ({ site, state })),
     };
+  }
+
+  /**
+   * Where several sites have a run, one that is open hides one that has ended; a silent site that is listed no longer
+   * hides nothing: it may have moved.
+   */
+  #runsOf(sites: readonly Doubtful[]): LiveState["runs"] {
+    const isLast = ({ site, state }: Doubtful) => site.isUnlisted && state.link !== "live";
+    const runs = new Map<string, Run>();
+    for (const each of sites) {
+      for (const [id, run] of each.state.runs) {
+        const known = runs.get(id);
+        if (known && (isLast(each) || known.ended_at === null)) continue;
+        runs.set(id, this.#runOf(run, each));
+      }
+    }
+    return runs;
   }
 
   /** A robot of a silent site does not answer, as far as this page knows. */

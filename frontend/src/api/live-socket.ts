@@ -178,6 +178,7 @@ export class LiveSocket {
       const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
       await new Promise((done) => setTimeout(done, AGAIN));
+      if (this.#closed) return; // another runner may have this address now
     }
   }
 
@@ -208,6 +209,28 @@ export class LiveSocket {
   /** Takes in a run that this page has just started, before the socket tells of it. */
   learn(run: Run): void {
     if (!this.state.runs.has(run.id)) this.#putRun(run);
+  }
+
+  /** Takes over what is known of the runner from its former address, and sends on each Stop that nobody has answered. */
+  takeOver({ runs: theirs, engines, stops }: LiveState): void {
+    const isNew = ({ id }: StopRequest) => this.state.stops.every((own) => own.id !== id);
+    for (const stop of stops) if (isWaiting(stop) && isNew(stop)) this.stop(stop.run, stop.id);
+    const { link, runs, engines: own } = this.state;
+    const others = [...theirs.values()].filter(({ id }) => !runs.has(id));
+    const isUnseen = ({ ended_at }: Run) => link === "live" && ended_at === null;
+    const told = others.map((run) =>
+      isUnseen(run) ? withUnseenEnd(run, this.clock.now() + tick()) : run,
+    );
+    const unproven = stops.filter((stop) => stop.provenAt === undefined && isNew(stop));
+    const joined = this.state.stops.map((stop) =>
+      withRuns(stop, stops.find(({ id }) => id === stop.id)?.runs ?? []),
+    );
+    this.#set({
+      engines: link === "live" || own.length > 0 ? own : engines,
+      runs: new Map([...told, ...runs.values()].map((run) => [run.id, run])),
+      stops: [...unproven, ...joined].sort((a, b) => a.at - b.at),
+    });
+    for (const run of told) if (isUnseen(run)) void this.#askEnd(run);
   }
 
   #connect(): void {
@@ -410,12 +433,14 @@ export class LiveSocket {
     if (stopping.length === 0) return;
     const { link, since } = this.state;
     const stops = this.state.stops.map((stop) => {
-      const { heardAt, provenAt: _, ...rest } = stop;
+      const { heardAt } = stop;
       if (stop.run !== "all" || heardAt === undefined) return stop;
       const unseen = link !== "live" && heardAt >= since; // this is the first that is seen since
       if (!unseen && tick() - heardAt > JOINS) return stop;
-      const more = stopping.map(({ id }) => id).filter((id) => !stop.runs.includes(id));
-      return more.length === 0 ? stop : { ...rest, heardAt, runs: [...stop.runs, ...more] };
+      return withRuns(
+        stop,
+        stopping.map(({ id }) => id),
+      );
     });
     this.state = { ...this.state, stops };
   }
@@ -442,6 +467,13 @@ export class LiveSocket {
     this.#toldAt = tick();
     tellEach(this.#listeners);
   }
+}
+
+/** Return a Stop that is about these runs, too: one of which it was not is not proven yet. */
+function withRuns(stop: StopRequest, runs: readonly string[]): StopRequest {
+  const more = runs.filter((id) => !stop.runs.includes(id));
+  const { provenAt: _, ...rest } = stop;
+  return more.length === 0 ? stop : { ...rest, runs: [...stop.runs, ...more] };
 }
 
 /** Return whether nobody has answered a Stop. */

@@ -12,7 +12,7 @@ import { foreignGraphs, type LiveState, openRuns, silentSites } from "./live-soc
 import { RunnerSockets } from "./runner-sockets";
 import type { Run } from "./runs";
 import { shiftOfRun } from "./site-places";
-import { siteOfId } from "./site-requests";
+import { noteSite, siteOfId } from "./site-requests";
 import { allSites, setSites } from "./sites";
 
 const A = { name: "Hall A", url: "http://h:1" };
@@ -191,6 +191,74 @@ test("a site that has moved is stopped at its former address until the new one s
   posted = [];
   live.stop("all");
   expect(stopped()).toEqual([A.url, B.url, C.url]);
+});
+
+test("a runner that has moved gets its Stops, and none goes for it to the one that has its address now", async () => {
+  live.setJoiner(new SitesJoiner());
+  live.setSites([A, B]);
+  hello(A.url);
+  hello(B.url, run("b"));
+  wireOf(B.url).close(1006);
+  silent = [B.url];
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(70_000);
+  const [first] = posted;
+  noteSite("read", B);
+  silent = [];
+  posted = [];
+  const [moved, newcomer] = [
+    { ...B, url: C.url },
+    { name: "Hall C", url: B.url },
+  ];
+  live.setSites([A, moved, newcomer]);
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(posted).toEqual([{ url: `${C.url}/api/stop`, id: first?.id }]);
+  expect(live.state.sites?.map(({ site }) => site)).toEqual([A, moved, newcomer]);
+  expect(openRuns(live.state).map(({ id, state }) => [id, state])).toEqual([["b", "unknown"]]);
+  hello(B.url, run("c"));
+  for (const each of ["b", "read"]) {
+    live.stop(each);
+    expect(posted.at(-1)?.url).toBe(`${C.url}/api/runs/${each}/stop`);
+  }
+});
+
+test("a Stop that a runner has heard is proven at the address to which it moves", async () => {
+  const stopped = { state: "stopped", ended_at: "2026-11-30T10:01:00Z", desired: "stopped" };
+  live.setJoiner(new SitesJoiner());
+  live.setSites([A, B]);
+  hello(A.url);
+  hello(B.url, run("b"));
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(70_000);
+  const sites = [A, { ...B, url: C.url }];
+  posted = [];
+  live.setSites(sites);
+  hello(C.url, run("b", { desired: "stopped" }));
+  hello(A.url);
+  expect(live.state.runs.get("b")?.state).toBe("running"); // as its runner says, and not as nobody did
+  live.setSites(sites);
+  expect(live.state.sites?.map(({ site }) => site)).toEqual(sites);
+  expect(live.state.stops).toMatchObject([{ state: "heard", runs: ["b"] }]);
+  expect(live.isStopping).toBe(true);
+  expect(posted).toEqual([]); // it may have begun something since that nobody meant to stop
+  wireOf(C.url).say({ type: "run", run: run("b", stopped) });
+  await vi.advanceTimersByTimeAsync(200);
+  expect(live.isStopping).toBe(false);
+  expect(said(live.state)).toContain("Hall B: Run 1: stopped.");
+});
+
+test("a run that one site says to have ended and another one to go on goes on", async () => {
+  live.setJoiner(new SitesJoiner());
+  live.setSites([A, B]);
+  hello(A.url, run("r"));
+  hello(B.url);
+  wireOf(B.url).say({ type: "run", run: run("r", { ended_at: "2026-11-30T10:01:00Z" }) });
+  await vi.advanceTimersByTimeAsync(200);
+  expect(openRuns(live.state).map(({ id }) => id)).toEqual(["r"]);
+  hello(A.url);
+  wireOf(A.url).say({ type: "run", run: run("r", { ended_at: "2026-11-30T10:01:00Z" }) });
+  hello(B.url, run("r"));
+  expect(openRuns(live.state).map(({ id }) => id)).toEqual(["r"]);
 });
 
 test("one runner that moves is stopped at both addresses, also where nothing joins them", () => {

@@ -51,18 +51,21 @@ const unlisted = ({ listedAs, site, socket }: Part): Part => ({
   socket,
 });
 
+/** Return the site of the same name, which is at another address. */
+const movedTo = (left: Part, listed: readonly Part[]): Part | undefined =>
+  listed.find(({ listedAs }) => listedAs === left.listedAs);
+
 /**
  * Return whether the socket of a site that the editor does not name any more is still needed: something goes on
- * there, or a Stop is not proven. One that has moved is needed until its new address says what goes on.
+ * there, or a Stop is not proven. One that has moved is needed until its new address says what goes on, and not
+ * where another runner has its address.
  */
 function isNeeded(part: Part, listed: readonly Part[]): boolean {
+  if (listed.some(({ site }) => site.url === part.site.url)) return false;
   const { state } = part.socket;
+  if (movedTo(part, listed)?.socket.state.link === "live" && state.link !== "live") return false;
   if (state.stops.some((stop) => stop.state === "heard" && stop.provenAt === undefined))
     return true;
-  const isMoved = listed.some(
-    ({ listedAs, socket }) => listedAs === part.listedAs && socket.state.link === "live",
-  );
-  if (isMoved && state.link !== "live") return false;
   const goesOn = openRuns(state).length + foreignGraphs(state).length > 0;
   return goesOn || state.stops.some(isWaiting);
 }
@@ -90,15 +93,19 @@ export class RunnerSockets implements Times {
   /** Takes the runners as the editor names them, and keeps the sockets of those that it knew. */
   setSites(sites: readonly Site[]): void {
     const old = this.#parts;
+    const hasMoved = ({ listedAs, site: { url } }: Part) =>
+      sites.some((site) => site.name === listedAs && site.url !== url);
     const parts = sites.map((site, i): Part => {
-      const known = old.find((part) => part.site.url === site.url);
+      const known = old.find((part) => part.site.url === site.url && !hasMoved(part));
       if (known?.site.name === site.name) return known;
       const socket = known?.socket ?? new LiveSocket(site.url, i === 0);
       return { listedAs: site.name, site, socket };
     });
     if (parts.length === old.length && parts.every((part, i) => part === old[i])) return;
     const left = old.filter(({ socket }) => !parts.some((part) => part.socket === socket));
-    const kept = left.filter((part) => isNeeded(part, parts)).map(unlisted);
+    const needed = left.filter((part) => isNeeded(part, parts));
+    const gone = left.filter((part) => !needed.includes(part));
+    const kept = needed.map(unlisted);
     this.#parts = [...parts, ...kept];
     setSites(this.#parts.length > 1 ? this.#parts.map(({ site }) => site) : []);
     const isFirst = old.length === 0;
@@ -118,7 +125,10 @@ export class RunnerSockets implements Times {
       socket.subscribeSeen(() => this.#see());
       tellEach([() => socket.open()]);
     }
-    for (const { socket } of left) if (!kept.some((part) => part.socket === socket)) socket.close();
+    for (const part of gone) {
+      part.socket.close();
+      tellEach([() => movedTo(part, parts)?.socket.takeOver(part.socket.state)]);
+    }
     this.setLost("");
   }
 

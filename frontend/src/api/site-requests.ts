@@ -24,8 +24,8 @@ interface SiteKnowledge {
 }
 
 let knowledge: (site: Site) => SiteKnowledge;
-/** The URL of the site of each run, repeat and entry of the queue that an answer has shown, and of each start, by its id. */
-const seen = new Map<string, string>();
+/** The site of each run, repeat and entry of the queue that an answer has shown, and of each start, by its id. */
+const seen = new Map<string, Site>();
 
 /** `know` tells what the live socket of a site says. */
 export function setKnowledge(know: (site: Site) => SiteKnowledge): void {
@@ -35,14 +35,18 @@ export function setKnowledge(know: (site: Site) => SiteKnowledge): void {
 
 /** Remember that a site has a run, or something else with an id. */
 export function noteSite(id: string, site: Site): void {
-  seen.set(id, site.url);
+  seen.set(id, site);
 }
 
 export function siteOfId(id: string): Site | undefined {
   const [run = id] = id.split(".");
   const all = allSites();
-  const url = seen.get(run);
-  return all.find((site) => knowledge(site).hasRun(run)) ?? all.find((site) => site.url === url);
+  const then = seen.get(run);
+  return (
+    all.find((site) => knowledge(site).hasRun(run)) ??
+    all.find(({ name }) => name === then?.name) ?? // it may have moved, and another one have its address
+    all.find(({ url }) => url === then?.url)
+  );
 }
 
 function sitesOfRobot(robot: string): Site[] {
