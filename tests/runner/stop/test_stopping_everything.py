@@ -4,6 +4,7 @@ virtual time."""
 import json
 
 import anyio
+import pytest
 
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.links.port import Order
@@ -57,6 +58,61 @@ async def test_a_robot_that_has_not_answered_yet_is_not_known_and_one_that_came_
         david.engine = engine(NEVER)
         await until(lambda: control.robots.robot("David").state == "restarted")
         assert control.stop_all(BEN).unknown == {}
+
+
+@virtual
+async def test_a_repeat_of_a_stop_reaches_no_run_that_was_admitted_since_it_first_came() -> None:
+    farah = Open(NEVER)
+    told: list[str] = []
+    async with fleet(Harness(), Farah=farah) as control:
+        control.watch_stops(lambda author, _robot, _run: told.append(author.id))
+        first = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
+        await anyio.sleep(5)
+        assert control.stop_all(BEN, "press").runs == [first]
+        assert control.stop_all(BEN, "press").runs == [first]
+        await until(lambda: first not in control.open)
+        second = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
+        await anyio.sleep(5)
+        assert control.stop_all(BEN, "press").runs == []
+        assert control.open[second].run.desired == "running"
+        assert told == ["ben"]
+        assert control.stop_all(BEN, "another press").runs == [second]
+
+
+@virtual
+async def test_a_repeat_of_a_stop_holds_no_start_back_that_was_asked_for_after_it() -> None:
+    farah = Open(NEVER)
+    harness = Harness()
+    async with fleet(harness, Farah=farah) as control, anyio.create_task_group() as tasks:
+        control.stop_all(BEN, "press")
+        harness.journal.slow = 1.0
+        tasks.start_soon(control.start, order(sequence(), engine="Farah"), ANN)
+        await anyio.sleep(0.5)
+        control.stop_all(BEN, "press")
+        await until(lambda: bool(control.open))
+        (opened,) = control.open.values()
+        await opened.published.wait()
+        assert (opened.run.end, opened.run.desired) == (None, "running")
+
+
+@pytest.mark.parametrize("stop_id", ["", "x" * 100])
+@virtual
+async def test_a_press_whose_id_says_nothing_is_a_stop_of_its_own(stop_id: str) -> None:
+    async with fleet(Harness(), Farah=Open(NEVER)) as control:
+        control.stop_all(BEN, stop_id)
+        run = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
+        assert control.stop_all(BEN, stop_id).runs == [run]
+
+
+@virtual
+async def test_an_id_of_another_person_or_of_long_ago_is_a_stop_of_its_own() -> None:
+    async with fleet(Harness(), Farah=Open(NEVER), Eve=Open(NEVER)) as control:
+        control.stop_all(BEN, "press")
+        first = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
+        assert control.stop_all(ANN, "press").runs == [first]
+        second = (await control.start(order(sequence(), engine="Eve"), ANN)).run.id
+        await anyio.sleep(3600)
+        assert control.stop_all(BEN, "press").runs == [second]
 
 
 @virtual

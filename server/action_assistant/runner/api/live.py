@@ -64,7 +64,7 @@ _LONGEST: Final = 10_000  # characters of a message from the page
 
 class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
     """A press of Stop. `run`: the id of a run or a group, or
-    "all"; `stop_id`: the id of the press."""
+    "all"; `stop_id`: the id of the press, as in the body of `POST /api/stop`."""
 
     run: str
     stop_id: str = ""

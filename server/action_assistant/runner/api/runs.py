@@ -94,7 +94,8 @@ _Asking = Request[Any, Any, Any]
 
 class StopBody(msgspec.Struct, frozen=True):
     """The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
-    on several ways."""
+    on several ways. A program gives each press another one, or none: for an hour, a Stop of everything
+    with an id of before, of the same person, reaches no run that was admitted since that first came."""
 
     stop_id: str = ""
 

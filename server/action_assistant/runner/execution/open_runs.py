@@ -41,6 +41,12 @@ class OpenRuns:
         self.last_number += 1
         return self.last_number
 
+    def admitted(self, newest: int | None) -> tuple[str, ...]:
+        """Return the ids of the open runs with a number up to `newest`; of all if it is None. A piece has
+        the number of its whole run."""
+        runs = self.by_id.items()
+        return tuple(each for each, it in runs if newest is None or it.run.number <= newest)
+
     # --- opening and driving ------------------------------------------------------------------
 
     def open(

@@ -363,13 +363,14 @@ class ExecutionService:
     # --- stop, pause, resume ------------------------------------------------------------------
 
     def stop_all(self, author: Author, stop_id: str = "") -> StoppedAll:
-        """Begin to stop all runs and all graphs that other programs have started. Return which runs
-        and graphs are being stopped, and the robots that cannot be reached. The call never waits.
-        `stop_id`: the id of the press, by which a repeated press is recognised."""
-        self._stops.note("", author, stop_id)
-        self._tell_of_stop(author, "", "")
+        """Begin to stop all runs and all graphs of other programs. Return which are being stopped, and the
+        robots that cannot be reached. The call never waits. `stop_id`: the id of the press; a repeat of
+        it reaches no run that was admitted since it first came."""
+        newest = self._stops.note_all(author, stop_id, self._runs.last_number)
+        if newest is None:
+            self._tell_of_stop(author, "", "")
         try:
-            stopped = self._stop_each(tuple(self.open), author, stop_id)
+            stopped = self._stop_each(self._runs.admitted(newest), author, stop_id)
         finally:
             graphs = self.foreign_stops.stop(author, self._runs.on)
         runs = [run for run in stopped if not self.open[run].is_led]
@@ -592,11 +593,10 @@ class ExecutionService:
         return with_health(found, self._health.of(plain.name), self._runtime.clock_us())
 
     async def register(self, asked: Registration, author: Author) -> Robot:
-        """Register a robot, or change its registration, and return it. Raise BadInput if the
-        registration is not valid, Conflict if the robot is in use or has the simulator's name,
-        Unavailable if the journal cannot store it."""
+        """Register a robot, or change its registration, and return it. Raise BadInput if that is not valid,
+        Conflict if it is in use or has the simulator's name, Unavailable if the journal cannot store it."""
         async with self._starts.turns([asked.name]):
-            self._check_unused(asked.name)
+            self.require_unused(asked.name)
             await self.robots.register(asked, author)
             return self.robot_view(asked.name)
 
@@ -604,10 +604,11 @@ class ExecutionService:
         """Remove a robot from the registry. Raise NotFound if the robot is not registered, Conflict
         if it is in use, Unavailable if the journal cannot store that."""
         async with self._starts.turns([robot]):
-            self._check_unused(robot)
+            self.require_unused(robot)
             await self.robots.remove(robot, author)
 
-    def _check_unused(self, robot: str) -> None:
+    def require_unused(self, robot: str) -> None:
+        """Raise Conflict if a registration cannot change now, since something goes on there."""
         run = self._runs.occupying(robot)
         if run is not None:
             raise Conflict(

@@ -1,7 +1,9 @@
 """Claims and stores starts: once for each request id, and stored before anything is sent."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from math import inf
 from typing import Any, Final, TypeVar
 from weakref import WeakValueDictionary
 
@@ -10,6 +12,7 @@ import msgspec
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.kit.clock import ClockUs
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.earlier import StartFrom
 from action_assistant.runner.runs.events import Author, Ended, Requested, draft_of
@@ -23,6 +26,8 @@ from action_assistant.web.auth.caller import BackgroundTasks
 
 #: Why a start on one of several robots does not leave any more.
 STOPPED_WITH: Final = "A run that was started with it was stopped before it began."
+_REPEATS_S: Final = 3600.0  # a later press with the same id is a Stop of its own
+_WHOLE_ID: Final = 100  # characters to which a longer id of a Stop is cut
 
 
 class StopOrder:
@@ -36,6 +41,7 @@ class StopOrder:
         self._most = most
         self._newest: dict[str, tuple[int, Author, str]] = {}
         self._refused: dict[str, tuple[int, str]] = {}
+        self._presses: LruCache[tuple[str, str], tuple[int, float]] = LruCache(most)
 
     def refuse(self, what: str, why: str) -> None:
         """Let no start of this repeat, or with this request id, leave that was asked for before now.
@@ -57,6 +63,19 @@ class StopOrder:
         self._newest.pop(what, None)
         self._newest[what] = self.count, author, stop_id
         _merge_oldest(self._newest, self._most)
+
+    def note_all(self, author: Author, stop_id: str, newest: int) -> int | None:
+        """Count a Stop of everything while the newest run has the number `newest`, and return None. If it
+        is a repeat of one that came within the last hour, count nothing, and return the number of
+        the newest run at that time. One without an id, or whose id may have been cut, is no repeat.
+        Nothing of this is stored: after a restart a repeat stops too much, and never too little."""
+        key, now = (author.id, stop_id), asyncio.get_running_loop().time()
+        first, came = self._presses.get(key) or (0, -inf)
+        if 0 < len(stop_id) < _WHOLE_ID and now - came < _REPEATS_S:
+            return first
+        self._presses.put(key, (newest, now))
+        self.note("", author, stop_id)
+        return None
 
     def since(self, count: int, *names: str) -> tuple[Author, str] | None:
         """Return author and id of the newest Stop of any of these, or of everything, after the
