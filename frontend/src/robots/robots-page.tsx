@@ -173,8 +173,7 @@ export function RobotsPage({ onImport }: Props) {
                   wayBack={
                     mayPractise &&
                     runner !== undefined &&
-                    robot.name === PRACTICE &&
-                    robot.state === "gone" && <PracticeEnded runner={runner} />
+                    robot.practice_ended && <PracticeEnded runner={runner} />
                   }
                 />
               ))}

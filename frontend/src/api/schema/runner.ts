@@ -2500,7 +2500,8 @@ export interface RunnerApi {
      *     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
      *     is not; `pressed`: why it counts as pressed, "" if it does not; `page_presence`: for how long the page
      *     of whoever is responsible for a run may be missing there, null where none is asked for;
-     *     `health_checks`: looked at before a start; `health`: what they show.
+     *     `health_checks`: looked at before a start; `health`: what they show. `practice_ended`: it is the
+     *     practice robot, and nobody answers there, so `POST /api/practice` starts it again.
      */
     Robot: {
         name: string;
@@ -2543,6 +2544,7 @@ export interface RunnerApi {
         page_presence: RunnerApi["PagePresence"] | null;
         health_checks: RunnerApi["HealthCheckShown"][];
         health: RunnerApi["HealthShown"][];
+        practice_ended: boolean;
     };
     /**
      * RobotChange
@@ -3333,7 +3335,8 @@ export interface RunnerApi {
     /**
      * StopBody
      * @description The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
-     *     on several ways.
+     *     on several ways. A program gives each press another one, or none: for an hour, a Stop of everything
+     *     with an id of before, of the same person, reaches no run that was admitted since that first came.
      */
     StopBody: {
         /** @default  */
@@ -3342,7 +3345,7 @@ export interface RunnerApi {
     /**
      * StopMessage
      * @description A press of Stop. `run`: the id of a run or a group, or
-     *     "all"; `stop_id`: the id of the press.
+     *     "all"; `stop_id`: the id of the press, as in the body of `POST /api/stop`.
      */
     StopMessage: {
         /** @enum {string} */

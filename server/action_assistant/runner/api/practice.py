@@ -10,7 +10,12 @@ from action_assistant.errors import Conflict, Unavailable
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.run_guard import unseen_by
 from action_assistant.runner.api.services import RunnerServices
-from action_assistant.runner.robots.practice_robot import NAME, PracticeRobot, registration_beside
+from action_assistant.runner.robots.practice_robot import (
+    NAME,
+    PracticeRobot,
+    is_practice,
+    registration_beside,
+)
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.web.auth.access import Needs
 
@@ -22,7 +27,7 @@ def practice_route(services: RunnerServices, practice: PracticeRobot) -> HTTPRou
         "/api/practice",
         summary="Start an emulated robot on the computer of the runner, and register it",
         description=f"Its name is `{NAME}`. It moves nothing, is seen on this computer only, and ends with the "
-        "runner, or when it is forgotten. Where it is registered and nobody answers there, it is started again. "
+        "runner, or when it is forgotten. Once it is known that it has ended, it is started again. "
         "503 where the runner has no ROS 2.",
         operation_id="startPracticeRobot",
         guards=[Needs("register")],
@@ -33,9 +38,18 @@ def practice_route(services: RunnerServices, practice: PracticeRobot) -> HTTPRou
             if robots.no_reach:
                 raise Unavailable(robots.no_reach)
             if NAME in robots.names:
-                if practice.is_running or robots.robot(NAME).servers > 0:
-                    raise Conflict(f"There is a robot {NAME} already; forget it first.")
                 asked = robots.registration(NAME)
+                if not is_practice(asked):
+                    raise Conflict(
+                        f"The robot {NAME} that is registered is not known to be an emulated one, so none "
+                        "takes its place; forget it first."
+                    )
+                known = robots.robot(NAME)
+                if practice.is_running or known.servers > 0:
+                    raise Conflict(f"There is a robot {NAME} already; forget it first.")
+                if not known.practice_ended:
+                    raise Conflict(f"Nobody knows yet whether {NAME} is there: {known.why}")
+                services.control.require_unused(NAME)
             else:
                 taken = {robots.registration(name).domain for name in robots.names}
                 asked = registration_beside({*taken, int(os.environ.get("ROS_DOMAIN_ID", "0"))})

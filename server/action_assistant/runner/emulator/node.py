@@ -75,6 +75,7 @@ class EmulatorNode:
         self._node = rclpy.create_node(
             NODE, context=self._context, namespace=namespace, enable_rosout=False
         )
+        self._logger = self._node.get_fully_qualified_name().strip("/").replace("/", ".")
         self._executor = SingleThreadedExecutor(context=self._context)
         self._feedback = self._node.create_publisher(UmrfGraphFeedback, facts.feedback_topic, 10)
         self._log = self._node.create_publisher(
@@ -196,7 +197,7 @@ class EmulatorNode:
             case LogMessage(text=text):
                 seconds, nanoseconds = divmod(time.time_ns(), 10**9)
                 at = Time(sec=seconds, nanosec=nanoseconds)
-                self._log.publish(Log(stamp=at, level=_INFO, name=NODE, msg=text))
+                self._log.publish(Log(stamp=at, level=_INFO, name=self._logger, msg=text))
             case Gone():
                 pass
             case _:

@@ -98,7 +98,8 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     starts. `actor`: the name in its feedback, "" before any. `process`: the engine's, if on this
     computer. `indexes`: it reads its folders again while it runs, so that asking it then may end it
     (H15); None if that is not known. `incarnation` changes when it is restarted. `ids_unknown`: the
-    ids that the middleware gives to endpoints do not show which process they belong to."""
+    ids that the middleware gives to endpoints do not show which process they belong to. `settled`:
+    discovery has had its time, so that an engine that it does not show is not there."""
 
     state: EngineState
     why: str = ""
@@ -112,6 +113,7 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     newcomers: tuple[str, ...] = ()
     indexes: bool | None = None
     ids_unknown: bool = False
+    settled: bool = False
 
     @property
     def doubt(self) -> str:

@@ -11,11 +11,18 @@ from anyio import Lock, to_thread
 from action_assistant.errors import Unavailable
 from action_assistant.runner.links.port import Registration
 from action_assistant.system.parent import PARENT
+from action_assistant.umrf.facts import PINNED
 
 #: The name of the robot, and the wake word of its engine.
 NAME: Final = "Practice"
+_NAMESPACE: Final = "action_assistant/practice"
+#: Where its engine answers. No other engine does, so a registration with this path is of no real robot.
+_GET_SERVICE: Final = f"{_NAMESPACE}/{PINNED.get_service}"
 _DOMAINS: Final = range(101, 0, -1)  # beyond them the ports of DDS may be those of other programs
-_COMMAND: Final = (sys.executable, "-m", "action_assistant", "simulate-robot", NAME)
+_COMMAND: Final = (
+    *(sys.executable, "-m", "action_assistant"),
+    *("simulate-robot", NAME, "--namespace", f"/{_NAMESPACE}"),
+)
 #: Nobody on another computer sees the robot, or can start anything there.
 _HERE: Final = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
@@ -51,11 +58,17 @@ def registration_beside(taken: Collection[int]) -> Registration:
     domains are."""
     for domain in _DOMAINS:
         if domain not in taken:
-            return Registration(name=NAME, domain=domain, led=True)
+            return Registration(name=NAME, domain=domain, get_service=_GET_SERVICE, led=True)
     raise Unavailable(
         f"All domains from {min(_DOMAINS)} to {max(_DOMAINS)} have robots, so none is left for {NAME}; "
         "forget a robot first."
     )
+
+
+def is_practice(registration: Registration) -> bool:
+    """Return whether a registration is that of the practice robot, and not of a robot that only has its
+    name."""
+    return registration.name == NAME and registration.get_service.strip("/") == _GET_SERVICE
 
 
 def _spawned(domain: int) -> tuple[subprocess.Popen[bytes], int]:

@@ -25,6 +25,7 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.practice_robot import is_practice
 from action_assistant.runner.robots.rights import Drilled, RobotRights
 from action_assistant.runner.runs.page_presence import PagePresence
 from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, Unseen
@@ -186,7 +187,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `limits`: of the numbers that are sent there; `hardware_stop`: where it is reported, null where it
     is not; `pressed`: why it counts as pressed, "" if it does not; `page_presence`: for how long the page
     of whoever is responsible for a run may be missing there, null where none is asked for;
-    `health_checks`: looked at before a start; `health`: what they show.
+    `health_checks`: looked at before a start; `health`: what they show. `practice_ended`: it is the
+    practice robot, and nobody answers there, so `POST /api/practice` starts it again.
     """
 
     name: str
@@ -226,6 +228,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     page_presence: PagePresence | None = None
     health_checks: tuple[HealthCheckShown, ...] = ()
     health: tuple[HealthShown, ...] = ()
+    practice_ended: bool = False
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -271,6 +274,9 @@ def with_engine(plain: Robot, engine: KnownEngine, stopping: StopTrouble) -> Rob
         others=standing.others,
         actor=standing.actor,
         pauses=engine.pauses,
+        practice_ended=is_practice(engine.registration)
+        and standing.settled
+        and standing.servers == 0,
     )
     if answer is None:
         return known

@@ -318,6 +318,7 @@ class Ros2Link:
                     time.monotonic(),
                 ),
                 ids_unknown=domain.ids_unknown,
+                settled=domain.settled,
             )
         )
 
