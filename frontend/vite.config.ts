@@ -27,7 +27,7 @@ const chunks: { name: string; test: RegExp; tags?: "$initial"[]; minShareCount?:
   // STOP needs nothing but this and React: see `app/stop-main.ts`.
   {
     name: "stop",
-    test: /src\/(app\/stop-main|clock\/|words\/|runs\/stop\/(stop-|outside-)|api\/(live-socket|runner-sockets|page-link|http|page-url|run-stop|session)|graph\/stop-basics|status\/help-link|ui\/(keys|times|tokens|watched|use-root-mark))/,
+    test: /src\/(app\/stop-main|clock\/|words\/|runs\/stop\/(stop-|outside-)|api\/(live-(messages|socket)|runner-sockets|page-link|http|page-url|run-stop|session)|graph\/stop-basics|status\/help-link|ui\/(keys|times|tokens|watched|use-root-mark))/,
   },
   // What every page loads comes in one piece: it is smaller than in many, and asked for once.
   {

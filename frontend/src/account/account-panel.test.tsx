@@ -60,7 +60,7 @@ test("while a STOP ALL is not proven, signing out says first that it would be se
   const signOut = await opened();
   await signOut();
   expect(deleted).toEqual([]);
-  expect(document.querySelector("[role=alert]")?.textContent).toContain("STOP ALL is not proven");
+  expect(document.querySelector("[role=alert]")?.textContent).toContain("A Stop is not proven");
   await signOut();
   expect(deleted).toHaveLength(2);
 });

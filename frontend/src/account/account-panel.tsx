@@ -89,7 +89,7 @@ interface Props {
 }
 
 const UNPROVEN =
-  "STOP ALL is not proven. Once you sign out, this page sends it no more, and does not show what becomes of it. Press Sign out again to leave all the same.";
+  "A Stop is not proven. Once you sign out, this page sends it no more, and does not show what becomes of it. Press Sign out again to leave all the same.";
 
 export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const { person, rename } = usePerson();

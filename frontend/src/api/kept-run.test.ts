@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { isUrgentChange, withKeptParts } from "./live-socket";
+import { isUrgentChange, withKeptParts } from "./live-messages";
 import type { Run } from "./runs";
 
 const action = (state: string) => ({ aid: "a", state, visits: [], older: 0, messages: [] });

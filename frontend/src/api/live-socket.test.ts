@@ -128,6 +128,81 @@ test("nothing is noted as proven while a robot's graphs, or the robot itself, ar
   }
 });
 
+/** What the runner answers to each Stop. */
+const STOPPING = { type: "stopping", stop_id: "", runs: [], graphs: {}, unknown: {} };
+const BEAT = { type: "beat", at: "" };
+
+test("nothing is proven before the socket says something after the Stop was heard", async () => {
+  const live = opened();
+  live.stop("all"); // no message comes any more, and POST goes
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(live.state).toMatchObject({ link: "live", stops: [{ state: "heard" }] });
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  newest().say(BEAT);
+  expect(live.state.stops[0]?.provenAt).toBeDefined();
+  live.close();
+});
+
+test("a Stop is about the runs that its answer names, also those that this page has not seen", async () => {
+  for (const what of ["all", "both"]) {
+    answering({ stop: [202, { ...STOPPING, runs: ["r", "q", "led.2"] }] });
+    const live = opened({ ...run("running"), group: "both" });
+    live.stop(what);
+    await vi.advanceTimersByTimeAsync(10);
+    newest().say(BEAT);
+    const ended = { ...run("stopped", "2026-01-01T00:00:00Z"), group: "both" };
+    newest().say({ type: "run", run: ended });
+    expect(live.state.stops[0]?.runs).toEqual(["r", "q", "led"]); // of its pieces nothing is told
+    expect(live.state.stops[0]?.provenAt).toBeUndefined();
+    newest().say({ type: "run", run: { ...ended, id: "q" } });
+    expect(live.state.stops[0]?.provenAt).toBeUndefined();
+    newest().say({ type: "run", run: { ...ended, id: "led" } });
+    expect(live.state.stops[0]?.provenAt).toBeDefined();
+    live.close();
+  }
+});
+
+test("a Stop whose answer names graphs or silent robots is not proven before the robots are told", async () => {
+  const robot = { name: "Dora", state: "answering", holds: [] };
+  for (const more of [{ graphs: { Dora: ["theirs"] } }, { unknown: { Dora: "No link." } }]) {
+    for (const isBySocket of [false, true]) {
+      answering(isBySocket ? {} : { stop: [202, { ...STOPPING, ...more }] });
+      const live = new LiveSocket("http://h:1");
+      live.open();
+      newest().say({ type: "hello", engines: [robot], runs: [] });
+      live.stop("all");
+      const { stop_id } = JSON.parse(newest().sent[0] ?? "");
+      if (isBySocket) newest().say({ ...STOPPING, ...more, stop_id });
+      await vi.advanceTimersByTimeAsync(10);
+      newest().say(BEAT);
+      expect(live.state.stops[0]).toMatchObject({ state: "heard" });
+      expect(live.state.stops[0]?.provenAt).toBeUndefined();
+      newest().say({ type: "engines", engines: [robot] });
+      expect(live.state.stops[0]?.provenAt).toBeDefined();
+      live.close();
+    }
+  }
+});
+
+test("the end of a run that began, was stopped and ended unseen is asked for", async () => {
+  const began = { ...run("stopped", "2026-01-01T00:00:00Z"), id: "began" };
+  answering({
+    "/api/stop": [202, { ...STOPPING, runs: ["began"] }],
+    "/api/runs/began": [200, began],
+  });
+  const live = opened();
+  newest().close(1006);
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(1_000);
+  newest().say({ type: "hello", engines: [], runs: [] });
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  await vi.advanceTimersByTimeAsync(10);
+  newest().say(BEAT);
+  expect(live.state.runs.get("began")?.state).toBe("stopped");
+  expect(live.state.stops[0]?.provenAt).toBeDefined();
+  live.close();
+});
+
 test("a Stop is heard although the socket fails just then", async () => {
   const live = opened(run("running"));
   newest().send = () => {
@@ -169,11 +244,13 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
 
 test("an answer that names no runs is none of the runner, and the Stop is sent again", async () => {
   const live = opened(run("running"));
-  vi.stubGlobal("fetch", async () => Response.json({ status: "ok" }));
   newest().close();
-  live.stop("all");
-  await vi.advanceTimersByTimeAsync(2_000);
-  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  for (const answer of [{ status: "ok" }, { runs: [{}] }]) {
+    vi.stubGlobal("fetch", async () => Response.json(answer));
+    live.stop("all");
+    await vi.advanceTimersByTimeAsync(2_000);
+    expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  }
   live.close();
 });
 
@@ -231,6 +308,60 @@ test("a Stop that nobody has heard is not crowded out by others", async () => {
   live.close();
 });
 
+test("a Stop that is not proven is not crowded out by others, and those of one target are one", async () => {
+  const others = Array.from({ length: 9 }, (_, n) => ({ ...run("running"), id: `other${n}` }));
+  const live = opened(run("running"), ...others);
+  const press = async (what: string) => {
+    live.stop(what);
+    await vi.advanceTimersByTimeAsync(10);
+    newest().say(BEAT);
+  };
+  const lost = { ...run("lost", "2026-01-01T00:00:00Z"), detail: "It was restarted." };
+  await press("r");
+  newest().say({ type: "run", run: lost });
+  await press("all"); // about the others
+  for (const { id } of others) await press(id);
+  for (let n = 0; n < 9; n += 1) await press("all");
+  const targets = live.state.stops.map((stop) => stop.run);
+  expect(new Set(targets)).toEqual(new Set(["r", "all", ...others.map(({ id }) => id)]));
+  expect(targets).toHaveLength(12); // the last press is joined with the one before when the next one comes
+  for (const { id } of others)
+    newest().say({ type: "run", run: { ...lost, state: "stopped", id } });
+  await vi.advanceTimersByTimeAsync(1_000);
+  newest().say(BEAT);
+  for (let n = 0; n < 9; n += 1) await press("all");
+  const unproven = live.state.stops.filter(({ provenAt }) => provenAt === undefined);
+  expect(unproven.map((stop) => stop.run)).toEqual(["r"]);
+  expect(live.state.stops).toHaveLength(6);
+  live.close();
+});
+
+test("a Stop that is asked for anew is about what the one before was about", async () => {
+  const live = opened(run("running"));
+  answering({});
+  live.stop("all");
+  newest().say({ type: "run", run: { ...run("lost", "2026-01-01T00:00:00Z") } });
+  live.stop("all");
+  expect(live.state.stops).toMatchObject([{ state: "asked", runs: ["r"] }]);
+  live.close();
+});
+
+test("only an answer that says so says that a runner does not have a run", async () => {
+  const live = opened();
+  answering({ stop: [403, { type: "forbidden", detail: "not you" }] });
+  live.stop("x");
+  const { stop_id } = JSON.parse(newest().sent[0] ?? "");
+  newest().say({ type: "refused", stop_id, detail: "not you" });
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops.at(-1)).toMatchObject({ state: "refused", detail: "not you" });
+  expect(live.state.stops.at(-1)?.isAbsent).toBeUndefined();
+  answering({ stop: [404, { type: "not_found", detail: "no such run" }] });
+  live.stop("x");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops.at(-1)).toMatchObject({ state: "refused", isAbsent: true });
+  live.close();
+});
+
 test("a Stop of everything that is pressed while the runner is silent stays one, and stops what began meanwhile", async () => {
   const live = opened(run("running"));
   newest().close(1006);
@@ -260,6 +391,20 @@ test("a Stop of everything that was heard before the runner is seen again is abo
   const began = { ...run("stopping"), id: "began", desired: "stopped" };
   newest().say({ type: "hello", engines: [], runs: [began] });
   expect(live.state.stops[0]?.runs).toEqual(["r", "began"]);
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  live.close();
+});
+
+test("a Stop of everything that was heard over a socket that is half dead is about what it stops", async () => {
+  const live = opened();
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state).toMatchObject({ link: "live", stops: [{ state: "heard" }] });
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(live.state.link).toBe("down"); // since its silence was noticed, after the answer
+  const began = { ...run("stopping"), id: "began", desired: "stopped" };
+  newest().say({ type: "hello", engines: [], runs: [began] });
+  expect(live.state.stops[0]?.runs).toEqual(["began"]);
   expect(live.state.stops[0]?.provenAt).toBeUndefined();
   live.close();
 });

@@ -1,10 +1,11 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { pageClock, ServerOffset, tick } from "../clock/server-clock";
-import { isEqual, newAid } from "../graph/stop-basics";
+import { newAid } from "../graph/stop-basics";
 import { runnerOnlyAt } from "./client";
 import type { AskedConfirmation } from "./confirmations";
 import { errorText, isFinal, isSignedIn, Refusal, sessionEnd } from "./http";
 import { isPieceOf } from "./led-runs";
+import { checkMessage, isUrgentChange, withKeptParts, withUnseenEnd } from "./live-messages";
 import { isBlocked } from "./page-url";
 import type { HeldGraph, Robot } from "./robots";
 import { postStop } from "./run-stop";
@@ -22,8 +23,8 @@ export interface StopRequest {
   /** The tick at which it was asked. */
   at: number;
   /**
-   * The runs that it is about: those that this page knew to go on when it was asked, and of "all" those
-   * that the runner has stopped since.
+   * The runs that it is about: those that this page knew to go on when it was asked, those that the runner says it
+   * stops, and of "all" those that the runner has stopped since.
    */
   runs: readonly string[];
   /**
@@ -36,6 +37,11 @@ export interface StopRequest {
   isAbsent?: true;
   /** The tick at which the runner had it. */
   heardAt?: number;
+  /**
+   * What has to come over the socket before anything is proven: any message, or one about robots where the runner
+   * named some that this page does not show as moving or silent.
+   */
+  awaits?: "message" | "robots";
   /** The tick at which all that it is about was told to rest: that stays proven, whatever is unknown later. */
   provenAt?: number;
 }
@@ -63,6 +69,7 @@ export interface SiteState {
 }
 
 type RunnerMessage = RunnerApi["RunnerMessage"];
+type Stopping = RunnerApi["Stopping"];
 type PageMessage = RunnerApi["PageMessage"];
 
 const SESSION_ENDED = 4401;
@@ -72,6 +79,7 @@ const JOINS = 6_000; // ms after "all" is heard in which a run that is being sto
 const AGAIN = 1_000; // ms between two tries to send a Stop
 const SOON = 5_000; // ms; the longest wait for another try to reach the runner
 const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
+const PIECE = /\.\d+$/; // ends the id of a piece of a led run, of which the runner tells as a whole
 const TOGETHER = 100; // ms in which news of runs are told together, unless they are urgent
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
@@ -92,6 +100,8 @@ export class LiveSocket {
   /** Time at which each robot last answered, by the server's clock. */
   robotAnsweredAt: ReadonlyMap<string, number> = new Map();
   readonly #seers = new Set<() => void>();
+  /** Runs that are being stopped, that the runner does not tell of, and whose end is being asked for. */
+  readonly #asking = new Set<string>();
   readonly #runner: string;
   readonly #listeners = new Set<() => void>();
   #socket: WebSocket | null = null;
@@ -163,17 +173,14 @@ export class LiveSocket {
   }
 
   /** "all" is sent as such until it is heard: a run may have begun before it that this page has not seen. */
-  async #keepStopping({ id, run }: StopRequest, first: Promise<unknown>): Promise<void> {
+  async #keepStopping({ id, run }: StopRequest, first: Promise<Stopping>): Promise<void> {
     for (let sent = first; ; sent = this.#sendStop(run, id)) {
       await sent.then(
-        () => this.#answerStop(id, "heard", ""),
+        (answer) => this.#answerStop(id, "heard", "", { answer, awaits: "message" }),
         (error) =>
-          this.#answerStop(
-            id,
-            isFinal(error) ? "refused" : "unheard",
-            errorText(error),
-            error instanceof Refusal && error.details.status === 404,
-          ),
+          this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error), {
+            isAbsent: error instanceof Refusal && error.details.status === 404,
+          }),
       );
       const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
@@ -182,7 +189,7 @@ export class LiveSocket {
     }
   }
 
-  async #sendStop(run: string, id: string): Promise<unknown> {
+  async #sendStop(run: string, id: string): Promise<Stopping> {
     const posted = postStop(this.#runner, run, id); // first: a socket that fails keeps it from nothing
     if (this.#socket?.readyState === WebSocket.OPEN) {
       const message: PageMessage = { type: "stop", run, stop_id: id };
@@ -230,7 +237,7 @@ export class LiveSocket {
       runs: new Map([...told, ...runs.values()].map((run) => [run.id, run])),
       stops: [...unproven, ...joined].sort((a, b) => a.at - b.at),
     });
-    for (const run of told) if (isUnseen(run)) void this.#askEnd(run);
+    for (const run of told) if (isUnseen(run)) void this.#askEnd(run.id);
   }
 
   #connect(): void {
@@ -252,7 +259,9 @@ export class LiveSocket {
       opened = true;
       this.#expect(socket);
       try {
-        this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
+        const message = JSON.parse(String(event.data)) as RunnerMessage;
+        this.#hear(message);
+        this.#endAwaiting(message.type);
       } catch (error) {
         // What goes on there is not known any more, until a whole account of it comes.
         console.error("A message of the runner cannot be read:", error, event.data);
@@ -314,7 +323,7 @@ export class LiveSocket {
   }
 
   #hear(message: RunnerMessage): void {
-    check(message);
+    checkMessage(message);
     switch (message.type) {
       case "hello": {
         this.#tries = 0;
@@ -336,17 +345,18 @@ export class LiveSocket {
           runs,
           queue: undefined, // it is said anew if something waits
         });
-        for (const run of unseen) void this.#askEnd(run);
+        for (const run of unseen) void this.#askEnd(run.id);
+        this.#askStopped();
         break;
       }
       case "run":
         this.#putRun(message.run);
         break;
       case "stopping":
-        this.#answerStop(message.stop_id, "heard", "");
+        this.#answerStop(message.stop_id, "heard", "", { answer: message });
         break;
       case "refused":
-        this.#answerStop(message.stop_id, "refused", message.detail, true);
+        this.#answerStop(message.stop_id, "refused", message.detail);
         break;
       case "confirm":
         this.#set({ asked: message.asked });
@@ -373,9 +383,20 @@ export class LiveSocket {
     }
   }
 
+  /** Asks for runs that are being stopped and that the runner does not tell of: they may have ended unseen. */
+  #askStopped(): void {
+    const { link, stops, runs } = this.state;
+    const meant = stops.flatMap((stop) => (link === "live" && isUnproven(stop) ? stop.runs : []));
+    for (const id of meant) {
+      if (runs.has(id) || this.#asking.has(id)) continue;
+      this.#asking.add(id);
+      void this.#askEnd(id).finally(() => this.#asking.delete(id));
+    }
+  }
+
   /** Asks how a run has ended until it is known, or the runner says something newer of the run. */
-  async #askEnd(run: Run): Promise<void> {
-    const { id } = run;
+  async #askEnd(id: string): Promise<void> {
+    const run = this.state.runs.get(id);
     const isAsked = () => !this.#closed && this.state.runs.get(id) === run;
     while (isAsked()) {
       try {
@@ -385,9 +406,10 @@ export class LiveSocket {
         return;
       } catch (error) {
         console.warn("A run's end is not known", id, errorText(error));
-        if (isFinal(error) && isAsked()) {
+        if (isFinal(error)) {
           const others = [...this.state.runs].filter(([other]) => other !== id);
-          this.#set({ runs: new Map(others) });
+          if (isAsked()) this.#set({ runs: new Map(others) });
+          return;
         }
       }
       await new Promise((done) => setTimeout(done, SOON));
@@ -406,23 +428,63 @@ export class LiveSocket {
     else this.#untold ??= setTimeout(() => this.#tell(), wait);
   }
 
-  /** One that nobody has answered stays, and is sent on, until it is asked for anew. */
+  /**
+   * One that nobody has answered stays, and is sent on, until it is asked for anew; one that is not proven stays, too.
+   * Those of the same target are one, which is about all that they were about.
+   */
   #putStop(stop: StopRequest): void {
-    const others = this.state.stops.filter((each) => !(isWaiting(each) && each.run === stop.run));
-    const answered = others.filter((each) => !isWaiting(each)).slice(1 - STOPS_KEPT);
-    const kept = others.filter((each) => isWaiting(each) || answered.includes(each));
-    this.#set({ stops: [...kept, stop] });
+    const { stops } = this.state;
+    const same = (is: (each: StopRequest) => boolean, run: StopRequest["run"]) =>
+      stops.filter((each) => is(each) && each.run === run);
+    const isKept = (each: StopRequest, i: number) => {
+      if (isWaiting(each)) return each.run !== stop.run;
+      if (isUnproven(each)) return same(isUnproven, each.run).at(-1) === each;
+      const later = stops.slice(i + 1).filter((other) => !isWaiting(other) && !isUnproven(other));
+      return later.length < STOPS_KEPT - 1;
+    };
+    const joined = (last: StopRequest, all: readonly StopRequest[]) => ({
+      ...last,
+      runs: [...new Set([...all, last].flatMap(({ runs }) => runs))],
+    });
+    const kept = stops
+      .filter(isKept)
+      .map((each) => (isUnproven(each) ? joined(each, same(isUnproven, each.run)) : each));
+    this.#set({ stops: [...kept, joined(stop, same(isWaiting, stop.run))] });
   }
 
-  #answerStop(id: string, state: StopRequest["state"], detail: string, isAbsent = false): void {
+  /** `more`: what its answer says beyond that, and what has to come after it. */
+  #answerStop(
+    id: string,
+    state: StopRequest["state"],
+    detail: string,
+    more: { answer?: Stopping; awaits?: "message"; isAbsent?: boolean } = {},
+  ): void {
+    const { answer, isAbsent } = more;
     const heard = state === "heard" && { heardAt: tick() };
+    const awaits = answer && namesMore(answer, this.state) ? ("robots" as const) : more.awaits;
+    const named = answer?.runs.map((run) => run.replace(PIECE, "")) ?? [];
     const stops = this.state.stops.map((stop) => {
       if (stop.id !== id || stop.state === "heard") return stop;
       // What began until it was heard is stopped by it as well.
       const late = heard && stop.run === "all" && tick() - stop.at > AGAIN;
-      const more = late ? openRuns(this.state).map((run) => run.id) : [];
-      const runs = [...new Set([...stop.runs, ...more])];
-      return { ...stop, state, detail, ...heard, ...(isAbsent && { isAbsent }), runs };
+      const began = late ? openRuns(this.state).map((run) => run.id) : [];
+      const runs = [...new Set([...stop.runs, ...began, ...named])];
+      const said = { ...(awaits && { awaits }), ...(isAbsent && { isAbsent }) };
+      return { ...stop, state, detail, ...heard, ...said, runs };
+    });
+    this.#set({ stops });
+    this.#askStopped();
+  }
+
+  /** Takes note that a message has come, after all that it says is known. */
+  #endAwaiting(type: RunnerMessage["type"]): void {
+    const isOfRobots = type === "hello" || type === "engines";
+    const isOver = ({ awaits }: StopRequest) =>
+      awaits === "message" || (awaits === "robots" && isOfRobots);
+    if (!this.state.stops.some(isOver)) return;
+    const stops = this.state.stops.map((stop) => {
+      const { awaits: _, ...rest } = stop;
+      return isOver(stop) ? rest : stop;
     });
     this.#set({ stops });
   }
@@ -431,12 +493,11 @@ export class LiveSocket {
   #joinStops(told: readonly Run[]): void {
     const stopping = told.filter((run) => run.ended_at === null && run.desired === "stopped");
     if (stopping.length === 0) return;
-    const { link, since } = this.state;
     const stops = this.state.stops.map((stop) => {
       const { heardAt } = stop;
       if (stop.run !== "all" || heardAt === undefined) return stop;
-      const unseen = link !== "live" && heardAt >= since; // this is the first that is seen since
-      if (!unseen && tick() - heardAt > JOINS) return stop;
+      // While it awaits a message, this is the first that is seen since.
+      if (stop.awaits === undefined && tick() - heardAt > JOINS) return stop;
       return withRuns(
         stop,
         stopping.map(({ id }) => id),
@@ -480,6 +541,20 @@ function withRuns(stop: StopRequest, runs: readonly string[]): StopRequest {
 export const isWaiting = ({ state }: StopRequest): boolean =>
   state === "asked" || state === "unheard";
 
+/** Return whether the runner has a Stop, and has not shown that all that it is about rests. */
+export const isUnproven = ({ state, provenAt }: StopRequest): boolean =>
+  state === "heard" && provenAt === undefined;
+
+/** Return whether an answer names robots of which this page does not show why they may move. */
+function namesMore({ graphs, unknown }: Stopping, now: LiveState): boolean {
+  const moving = new Set(foreignGraphs(now).map(({ robot }) => robot.name));
+  const silent = new Set(unheardRobots(now).map(({ name }) => name));
+  return (
+    Object.keys(graphs ?? {}).some((name) => !moving.has(name)) ||
+    Object.keys(unknown ?? {}).some((name) => !silent.has(name))
+  );
+}
+
 /** Calls all listeners. One that fails keeps no other one, and nothing that comes after, from its turn. */
 export function tellEach(listeners: Iterable<() => void>): void {
   for (const listener of listeners) {
@@ -491,93 +566,9 @@ export function tellEach(listeners: Iterable<() => void>): void {
   }
 }
 
-/** Return a run whose end nobody has seen yet, as it is shown until the runner says how it ended. */
-function withUnseenEnd(run: Run, now: number): Run {
-  const since = run.unknown_since ?? new Date(now).toISOString();
-  return { ...run, state: "unknown", unknown_since: since };
-}
-
-const isObject = (part: unknown): part is object => typeof part === "object" && part !== null;
-const isText = (part: unknown) => part == null || typeof part === "string";
-
-/** Returns whether this is a list of objects with these texts. */
-function isListOf<T>(list: readonly T[], ...texts: readonly (keyof T)[]): boolean {
-  const isWhole = (part: T) =>
-    isObject(part) && texts.every((name) => typeof part[name] === "string");
-  return Array.isArray(list) && list.every(isWhole);
-}
-
-/** Throws an error if a message lacks what each robot and each run has: STOP and its notices read it. */
-function check(message: RunnerMessage): void {
-  const { type } = message;
-  const robots = type === "hello" || type === "engines" ? message.engines : [];
-  const runs: Run[] = type === "hello" ? message.runs : type === "run" ? [message.run] : [];
-  const isSound =
-    isListOf(robots, "name") &&
-    robots.every(
-      ({ holds }) => isListOf(holds, "graph") && holds.every(({ run }) => isText(run)),
-    ) &&
-    isListOf(runs, "id") &&
-    runs.every(
-      ({ alarms, unconfirmed, actions, rests }) =>
-        isListOf(alarms, "code", "text") &&
-        isText(unconfirmed) &&
-        Object.values(actions ?? {}).every(isObject) &&
-        isListOf(rests ?? [], "robot") &&
-        (rests ?? []).every(({ why }) => isText(why)),
-    ) &&
-    (type !== "confirm" || isListOf(message.asked));
-  if (!isSound) throw new TypeError("It lacks a part.");
-}
-
 /** Moments of the server's clock by name, ms since 1970. */
 function times(told: Record<string, string> | undefined): Map<string, number> {
   return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at)]));
-}
-
-type RunActionsTold = NonNullable<Run["actions"]>;
-
-function keptActions(before: RunActionsTold, now: RunActionsTold): RunActionsTold {
-  let changed = Object.keys(before).length !== Object.keys(now).length;
-  const kept: RunActionsTold = {};
-  for (const [name, action] of Object.entries(now)) {
-    const known = before[name];
-    if (known !== undefined && isEqual(known, action)) kept[name] = known;
-    else {
-      kept[name] = action;
-      changed = true;
-    }
-  }
-  return changed ? kept : before;
-}
-
-/**
- * Returns the new state of a run with the same objects for all that has not changed, so that it is not drawn again;
- * `before` itself if nothing has.
- */
-export function withKeptParts(before: Run | undefined, now: Run): Run {
-  if (before?.actions == null || now.actions == null) return now;
-  const kept = { ...now, actions: keptActions(before.actions, now.actions) };
-  return isEqual(before, kept) ? before : kept;
-}
-
-/** Fields that must be shown without delay: the state of the run itself, and alarms. */
-const URGENT = [
-  "state",
-  "desired",
-  "ended_at",
-  "unconfirmed",
-  "unknown_since",
-  "moves_again_at",
-  "at_rest",
-  "proof_at",
-  "recorded",
-  "stopped_by",
-] as const satisfies readonly (keyof Run)[];
-
-export function isUrgentChange(before: Run | undefined, now: Run): boolean {
-  if (before === undefined || before.alarms.length !== now.alarms.length) return true;
-  return URGENT.some((field) => !isEqual(before[field], now[field]));
 }
 
 /** The runs that go on, newest first, as far as this page knows. */
@@ -668,7 +659,7 @@ export function stopTargets(stop: StopRequest, now: LiveState): Run[] {
 
 /** Return whether the runner says now that everything that a Stop is about has come to rest. */
 function isProven(stop: StopRequest, now: LiveState): boolean {
-  if (now.link !== "live" || stop.state !== "heard") return false;
+  if (now.link !== "live" || stop.state !== "heard" || stop.awaits !== undefined) return false;
   const runs = stopTargets(stop, now);
   if (!stop.runs.every((id) => now.runs.has(id))) return false;
   if (runs.some((run) => run.ended_at === null || run.state === "lost")) return false;

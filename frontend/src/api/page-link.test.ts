@@ -152,6 +152,22 @@ test("a STOP ALL that no runner has heard as the session ends is sent on, and sh
   expect(pageLink.now()).toMatchObject({ live: null, signedIn: false });
 });
 
+test("a Stop of one run that no runner has heard as the session ends is sent on, too", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  hear();
+  const { heard, end } = silence();
+  pageLink.now().live?.stop("r");
+  const [stop] = pageLink.now().live?.state.stops ?? [];
+  await pass(100);
+  pageLink.leave();
+  await pass(5_000);
+  expect(pageLink.now()).toMatchObject({ signedIn: true });
+  end();
+  await pass(1_100);
+  expect(heard).toEqual([stop?.id]);
+});
+
 test("whoever signs in while a STOP ALL is not proven keeps it, and dials anew", async () => {
   chunk.fails = false;
   await pass(6_000);

@@ -15,7 +15,7 @@ export interface PageLinkState {
   /** The address that stands for all runners, once the page can send them requests. */
   runner: string | undefined;
   /**
-   * Set if a person is signed in, as far as this page knows, or a STOP ALL of one who was is not proven: only
+   * Set if a person is signed in, as far as this page knows, or a Stop of one who was is not proven: only
    * then STOP is shown.
    */
   signedIn: boolean;
@@ -36,7 +36,7 @@ class PageLink {
   #refreshTimer: ReturnType<typeof setTimeout> | undefined;
   /** Ends the pause between two tries. */
   #endPause = () => {};
-  /** Ends waiting for the proof of a STOP ALL of somebody who has left. */
+  /** Ends waiting for the proof of the Stops of somebody who has left. */
   #endWait = () => {};
 
   now = (): PageLinkState => this.#state;
@@ -66,8 +66,8 @@ class PageLink {
   }
 
   /**
-   * Says that nobody is signed in any more. A STOP ALL that is not proven is sent and shown until it is: a
-   * session that has expired still stops.
+   * Says that nobody is signed in any more. A Stop that is not proven is sent until it is heard, and shown: a
+   * session that has expired still stops. Its proof is seen only once somebody signs in, if the session has ended.
    */
   leave(): void {
     this.#endWait();

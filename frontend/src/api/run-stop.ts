@@ -48,13 +48,14 @@ export async function postStop(
   runner: string,
   run: string | "all",
   stop: string,
-): Promise<unknown> {
+): Promise<RunnerApi["Stopping"]> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
   const request = { method: "POST", body: { stop_id: stop }, timeoutMs: 3_000 } as const;
   const answer: unknown = await (await fetchAnswer(`${runner}${path}`, request)).json();
-  if (!Array.isArray((answer as { runs?: unknown } | null)?.runs))
+  const runs = (answer as { runs?: unknown } | null)?.runs;
+  if (!Array.isArray(runs) || runs.some((each) => typeof each !== "string"))
     throw new Error("What answers there is not the runner.");
-  return answer;
+  return answer as RunnerApi["Stopping"];
 }
 
 export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {

@@ -284,6 +284,36 @@ test("a Stop that is not proven stays in sight when its runner moves, or is name
   expect(said(live.state)).toContain("UNCONFIRMED");
 });
 
+test("a Stop is going on while any one is not answered, or not proven", async () => {
+  live.setSites([A]);
+  hello(A.url, run("a"), run("b"));
+  const beat = async () => {
+    await vi.advanceTimersByTimeAsync(1_100);
+    wireOf(A.url).say({ type: "beat", at: "" });
+  };
+  const end = (id: string, state: string) =>
+    wireOf(A.url).say({ type: "run", run: run(id, { state, ended_at: "2026-11-30T10:01:00Z" }) });
+  expect(live.isStopping).toBe(false);
+  silent = [A.url];
+  live.stop("a");
+  expect(live.isStopping).toBe(true);
+  silent = [];
+  await beat();
+  expect(live.state.stops).toMatchObject([{ run: "a", state: "heard" }]);
+  expect(live.isStopping).toBe(true);
+  live.stop("all");
+  end("a", "lost");
+  end("b", "stopped");
+  for (let n = 0; n < 6; n += 1) {
+    await beat();
+    live.stop("all"); // nothing runs any more
+  }
+  await beat();
+  expect(live.isStopping).toBe(true); // nobody has looked at what was lost
+  end("a", "stopped");
+  expect(live.isStopping).toBe(false);
+});
+
 test("of several runners that became one, Stop of a run goes to that one", () => {
   live.setJoiner(new SitesJoiner());
   live.setSites([A, B]);
@@ -313,6 +343,7 @@ test("a site that is named no longer and rests is gone, and one runner needs no 
   for (const { url } of [A, B]) hello(url);
   live.stop("all");
   await vi.advanceTimersByTimeAsync(100);
+  wireOf(B.url).say({ type: "beat", at: "" }); // it has said since that nothing runs
   live.setSites([{ name: "", url: A.url }]);
   expect(live.state.sites).toBeUndefined();
   expect(wireOf(B.url).readyState).not.toBe(WebSocket.OPEN);

@@ -6,6 +6,7 @@ import { tick } from "../clock/server-clock";
 import { newAid } from "../graph/stop-basics";
 import {
   foreignGraphs,
+  isUnproven,
   isWaiting,
   LiveSocket,
   type LiveState,
@@ -64,8 +65,7 @@ function isNeeded(part: Part, listed: readonly Part[]): boolean {
   if (listed.some(({ site }) => site.url === part.site.url)) return false;
   const { state } = part.socket;
   if (movedTo(part, listed)?.socket.state.link === "live" && state.link !== "live") return false;
-  if (state.stops.some((stop) => stop.state === "heard" && stop.provenAt === undefined))
-    return true;
+  if (state.stops.some(isUnproven)) return true;
   const goesOn = openRuns(state).length + foreignGraphs(state).length > 0;
   return goesOn || state.stops.some(isWaiting);
 }
@@ -149,12 +149,16 @@ export class RunnerSockets implements Times {
     this.#hear();
   }
 
-  /** Whether the last STOP ALL is not proven at some runner, or no runner is known yet. */
+  /**
+   * Whether a Stop is not answered or not proven at some runner, the last STOP ALL is refused, or it waits since no
+   * runner is known yet.
+   */
   get isStopping(): boolean {
     const last = this.#pressed.at(-1);
-    const isDue = ({ id, provenAt }: StopRequest) => id === last?.id && provenAt === undefined;
-    const isDueAt = ({ socket: { state } }: Part) => state.stops.some(isDue);
-    return last !== undefined && (this.#parts.length === 0 || this.#parts.some(isDueAt));
+    const isDue = (stop: StopRequest) =>
+      isWaiting(stop) || isUnproven(stop) || (stop.state === "refused" && stop.id === last?.id);
+    if (this.#parts.length === 0) return last !== undefined;
+    return this.#parts.some(({ socket: { state } }) => state.stops.some(isDue));
   }
 
   close(): void {

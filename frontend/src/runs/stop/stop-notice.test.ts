@@ -99,6 +99,30 @@ test("without the runner nothing is claimed", () => {
   expect(noticeOf(unanswered, now({}), 9000)?.text).toContain("NOT SENT");
 });
 
+test("a Stop that was heard says nothing of rest before the runner says something after it", () => {
+  const awaiting = { ...stop, run: "all", runs: ["q"], awaits: "message" } as const;
+  expect(noticeOf(awaiting, now(null), 1_500)).toMatchObject({ tone: "quiet", text: "Stop sent" });
+  expect(noticeOf(awaiting, now(null), 9_000)?.text).toMatch(/^STOP UNCONFIRMED: sent, but no/);
+  const ended = now({ state: "stopped", ended_at: "1970-01-01T00:00:00Z" });
+  const one = { ...stop, awaits: "message" } as const;
+  expect(noticeOf(one, ended, 1_500)?.text).toBe("Stop sent"); // it may move again
+  const both = wholeNotice(
+    { ...ended, stops: [awaiting, { ...stop, provenAt: 2_000 }] },
+    NONE,
+    9_000,
+  );
+  expect(both?.text).toMatch(/^STOP UNCONFIRMED: sent, but no word/);
+});
+
+test("no proof is promised to a page whose session has ended", () => {
+  const unreached = { kind: "ended", why: "Your session has ended." } as const;
+  const ended = { ...now(null, "down"), unreached };
+  expect(noticeOf({ ...stop, run: "all" }, ended, 9_000)?.text).toMatch(
+    /only once somebody signs in/,
+  );
+  expect(noticeOf({ ...stop, run: "all" }, now(null, "down"), 9_000)?.text).not.toMatch(/session/);
+});
+
 test("what was proven stays proven when the runner is silent later, and the rest is said apart", () => {
   const proof = { proof_at: "1970-01-01T00:00:02Z", ended_at: "1970-01-01T00:00:02Z" };
   const ended = now({ state: "stopped", ...proof }, "down");
@@ -129,6 +153,19 @@ test("a name that turns words around keeps the words of a notice where they are"
   expect(loud).toMatch(/^STOP UNCONFIRMED: run 7 on \u2068Da\u202evid\u2069: /);
   const named = { id: "a", number: 1, graph_name: "\u202egrab", group: null } as Run;
   expect(runToStop([named])?.words).toBe("run 1 of \u2068\u202egrab\u2069");
+});
+
+test("a reason that turns words around keeps the words after it where they are", () => {
+  const detail = "no \u202e such";
+  const kept = `\u2068${detail}\u2069`;
+  const refused: StopRequest = { ...stop, state: "refused", detail };
+  expect(noticeOf(refused, now(null), 2_000)?.text).toContain(`: ${kept} Use the`);
+  const unheard: StopRequest = { ...stop, state: "unheard", detail };
+  expect(noticeOf(unheard, now(null), 2_000)?.text).toContain(`. ${kept} Trying`);
+  const lost = now({ state: "lost", ended_at: "1970-01-01T00:00:02Z", detail });
+  expect(noticeOf(stop, lost, 2_500)?.text).toContain(`: ${kept} Look`);
+  const gone = { ...now(null, "down"), unreached: { kind: "silent", why: detail } } as const;
+  expect(unreachableNotice(gone, 60_000)?.text).toContain(`: ${kept} Use the`);
 });
 
 test("a refused Stop says why", () => {
@@ -196,6 +233,30 @@ test("a run that was called stopped and moves again is shouted before anything e
   expect(notice?.text).toContain("MOVES AGAIN: run 7: David shows Work_0 moving");
   expect(notice?.text).toContain("It is being stopped again.");
   expect(notice?.text).toContain("hardware stop");
+});
+
+test("what moves again hides no Stop that is not sent, refused or unconfirmed", () => {
+  const text = "MOVES AGAIN: David shows Work_0 moving.";
+  const alarms = [{ code: "moves_again", at: "", text }];
+  const moves = { desired: "running", moves_again_at: "t", alarms } as unknown as Partial<Run>;
+  const whole = (stops: readonly StopRequest[], link: LiveState["link"] = "live") =>
+    wholeNotice({ ...now(moves, link), stops }, NONE, 60_000);
+  expect(whole([])?.text).toMatch(/^MOVES AGAIN: .* Nobody has asked to stop it\./);
+  const sent: StopRequest = { ...stop, run: "all", detail: "A fault." };
+  const unsent = whole([{ ...sent, state: "unheard" }], "down");
+  expect(unsent && headOf(unsent)).toBe("MOVES AGAIN · NOT SENT");
+  expect(unsent?.text).not.toContain("Nobody");
+  const refused = whole([{ ...stop, state: "refused", detail: "Withdrawn." }]);
+  expect(refused?.text).toMatch(/^MOVES AGAIN: .* Stop refused: Withdrawn\./);
+  expect(refused?.text).not.toContain("Nobody");
+  expect(whole([{ ...stop, run: "q", state: "refused" }])?.text).toContain("Nobody");
+  const { runs, ...state } = now(moves);
+  const deaf = { ...runs.get("r"), id: "q", number: 8, moves_again_at: null, alarms: [] };
+  const theirs = { ...deaf, desired: "stopped", unconfirmed: "no answer" } as unknown as Run;
+  const both = { ...state, stops: [], runs: new Map(runs).set("q", theirs) };
+  expect(wholeNotice(both, NONE, 60_000)?.text).toMatch(
+    /^MOVES AGAIN: run 7.*STOP UNCONFIRMED: run 8/,
+  );
 });
 
 test("what is put aside keeps its head, and comes back when it is about something else", () => {
@@ -267,6 +328,17 @@ test("a later STOP ALL covers no run whose loss left its Stop unconfirmed", () =
   const notice = wholeNotice({ ...lost, stops: [stop, all] }, NONE, 60_000);
   expect(notice).toMatchObject({ tone: "loud" });
   expect(notice?.text).toMatch(/^STOP UNCONFIRMED: run 7 on David: The engine was restarted/);
+});
+
+test("a later STOP ALL covers no earlier one whose runs are lost, or not known to rest", () => {
+  const first: StopRequest = { ...stop, run: "all", runs: ["r"] };
+  const later: StopRequest = { ...stop, id: "l", run: "all", at: 50_000, provenAt: 51_000 };
+  const detail = "The engine was restarted while the run went on.";
+  const lost = now({ state: "lost", ended_at: "1970-01-01T00:00:02Z", detail });
+  for (const state of [lost, now(null)]) {
+    const notice = wholeNotice({ ...state, stops: [first, later] }, NONE, 52_000);
+    expect(notice?.text).toMatch(/^STOP UNCONFIRMED: .* The runner says that nothing runs\.$/);
+  }
 });
 
 test("a later Stop of the same run, of its group or of everything takes the place of an earlier one", () => {

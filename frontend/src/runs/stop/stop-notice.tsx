@@ -66,7 +66,7 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const waited = at - stop.at;
   const since = `asked ${duration(waited)} ago`;
   if (stop.state === "refused") {
-    return { tone: "loud", text: `Stop refused: ${stop.detail} Use the hardware stop.` };
+    return { tone: "loud", text: `Stop refused: ${isolated(stop.detail)} Use the hardware stop.` };
   }
   const unsent = stop.state === "unheard" || (stop.state === "asked" && waited > HEARD);
   if (unsent) {
@@ -75,7 +75,7 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
     return {
       tone: "loud",
       stays: true,
-      text: `NOT SENT: use the hardware stop. ${why} Trying again.`,
+      text: `NOT SENT: use the hardware stop. ${isolated(why)} Trying again.`,
       since,
     };
   }
@@ -83,10 +83,10 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const open = runs.filter((run) => run.ended_at === null);
   const down = now.link === "down";
   const isKnown = stop.provenAt !== undefined || (stop.run !== "all" && runs.length > 0);
-  if (down && (open.length > 0 || !isKnown)) return silentNotice(runs, since);
-  if (now.link === "connecting" && !isKnown) {
-    return waited < LOUD ? { tone: "quiet", text: "Stop sent", since } : silentNotice(runs, since);
-  }
+  if (down && (open.length > 0 || !isKnown)) return silentNotice(runs, now, since);
+  const sent = (): StopNoticeText =>
+    waited < LOUD ? { tone: "quiet", text: "Stop sent", since } : silentNotice(runs, now, since);
+  if (now.link === "connecting" && !isKnown) return sent();
   if (open.length > 0) {
     if (waited >= LOUD) return unconfirmed(open, since);
     const names = open.map((run) => `run ${run.number}`).join(", ");
@@ -95,10 +95,11 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const lost = runs.filter((run) => run.state === "lost");
   if (lost.length > 0) {
     const ends = lost
-      .map((run) => `run ${run.number} on ${engineWords(run)}: ${run.detail}`)
+      .map((run) => `run ${run.number} on ${engineWords(run)}: ${isolated(run.detail)}`)
       .join(" ");
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
+  if (stop.awaits !== undefined) return sent();
   if (!down && stop.provenAt === undefined && stop.runs.some((id) => !now.runs.has(id))) {
     const text =
       "STOP UNCONFIRMED: the runner does not say how a run ended that was to be stopped. Look at the robot.";
@@ -120,12 +121,16 @@ const endOf = (run: Run) => {
 };
 
 /** The runner is silent since: what it said before that stays true, and of the rest nothing is known. */
-function silentNotice(runs: readonly Run[], since: string): StopNoticeText {
+function silentNotice(runs: readonly Run[], now: LiveState, since: string): StopNoticeText {
   const open = runs.filter((run) => !isAtRest(run));
   const who = open.map((run) => `run ${run.number} on ${engineWords(run)}: `).join("");
   const before = runs.filter(isAtRest).map(endOf).join(", ");
   const proven = before === "" ? "" : ` Proven before that: ${before}.`;
-  const text = `STOP UNCONFIRMED: ${who}sent, but no word from the runner since.${proven}`;
+  const ended =
+    now.unreached?.kind === "ended"
+      ? " The session has ended: a proof is shown only once somebody signs in."
+      : "";
+  const text = `STOP UNCONFIRMED: ${who}sent, but no word from the runner since.${ended}${proven}`;
   return { tone: "loud", stays: true, text, since };
 }
 
@@ -157,7 +162,7 @@ function foreignNotice(now: LiveState, since?: string): StopNoticeText {
       ...(since && { since }),
     };
   }
-  const text = `STOP UNCONFIRMED: ${isolated(held.graph)} on ${isolated(robot.name)}: ${held.stopping}.`;
+  const text = `STOP UNCONFIRMED: ${isolated(held.graph)} on ${isolated(robot.name)}: ${isolated(held.stopping)}.`;
   return { tone: "loud", stays: true, text };
 }
 
@@ -170,7 +175,7 @@ function doneNotice(runs: readonly Run[], unknown: readonly Robot[]): StopNotice
   }
   const names = unknown.map(({ name }) => isolated(name)).join(", ");
   const one = unknown.length === 1 ? "runs" : "run";
-  const why = unknown[0]?.why ?? "";
+  const why = isolated(unknown[0]?.why ?? "");
   const head = runs.length === 0 ? "No run from here goes on." : `${ends}.`;
   return { tone: "loud", text: `${head} NOT KNOWN what ${names} ${one}. ${why}`.trimEnd() };
 }
@@ -182,9 +187,13 @@ export function movingAgain(now: LiveState): StopNoticeText {
   const each = runs.map((run) => {
     const told = run.alarms.findLast((alarm) => alarm.code === "moves_again");
     const text = spokenIn(run, told?.text ?? "").replace(/^MOVES AGAIN: /, "");
-    const then =
-      run.desired === "stopped" ? "It is being stopped again." : "Nobody has asked to stop it.";
-    return `run ${run.number}: ${text} ${then}`;
+    const isAsked = now.stops.some(
+      (stop) =>
+        stop.provenAt === undefined && (stop.run === "all" || stopTargets(stop, now).includes(run)),
+    );
+    const unasked = isAsked ? "" : " Nobody has asked to stop it.";
+    const then = run.desired === "stopped" ? " It is being stopped again." : unasked;
+    return `run ${run.number}: ${text}${then}`;
   });
   const since =
     now.link === "down" ? ` Runner unknown since ${clock(serverTimeOf(now.since))}.` : "";
@@ -219,7 +228,7 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   if (now.link === "live" || at - now.since < UNREACHED) return null;
   const { kind, why } = now.unreached ?? { kind: "silent", why: "The runner does not answer." };
   const head = kind === "mute" ? "STOP CANNOT BE PROVEN HERE" : "STOP MAY REACH NOBODY";
-  const text = `${head}: ${why} Use the hardware stop.`;
+  const text = `${head}: ${isolated(why)} Use the hardware stop.`;
   return { tone: "loud", stays: true, text };
 }
 
@@ -248,19 +257,30 @@ function toldStops(now: LiveState, dismissed: ReadonlySet<string>): StopRequest[
   const isDue = (stop: StopRequest, i: number) =>
     i === now.stops.length - 1 ||
     stop.state !== "heard" ||
-    stopTargets(stop, now).some((run) => !isAtRest(run));
+    stop.awaits !== undefined ||
+    openAimsOf(stop, now).length > 0;
   return now.stops
     .filter((stop, i) => isDue(stop, i) && !isCovered(stop, now.stops.slice(i + 1), now))
     .filter(({ id, state }) => state === "unheard" || !dismissed.has(id))
     .reverse();
 }
 
+/** Return the ids of the runs that a Stop is about and that are not known to rest. */
+function openAimsOf(stop: StopRequest, now: LiveState): string[] {
+  const ids = new Set([...stop.runs, ...stopTargets(stop, now).map(({ id }) => id)]);
+  return [...ids].filter((id) => {
+    const run = now.runs.get(id);
+    return run === undefined ? stop.provenAt === undefined : !isAtRest(run);
+  });
+}
+
 /** Return whether one of the later Stops means all that a Stop is about. */
 function isCovered(stop: StopRequest, later: readonly StopRequest[], now: LiveState): boolean {
   const runs = stopTargets(stop, now);
+  const open = openAimsOf(stop, now);
   const means = ({ run, runs: stopped }: StopRequest) =>
-    (run === "all" && runs.every((each) => stopped.includes(each.id) || isAtRest(each))) ||
-    run === stop.run ||
+    (run === "all" && open.every((id) => stopped.includes(id))) ||
+    (run !== "all" && run === stop.run) ||
     (runs.length > 0 && runs.every((each) => each.group === run));
   return later.some(means);
 }
@@ -292,17 +312,16 @@ function textOf(stop: StopRequest, text: string, now: LiveState): string {
 /** Return the notices of one runner. `dismissed`: as for `toldStops`. */
 function noticesOf(now: LiveState, dismissed: ReadonlySet<string>, at: number): readonly Notice[] {
   const moving = movingAgain(now);
-  if (moving !== null) return [moving];
   const own = toldStops(now, dismissed).flatMap((stop) => {
     const notice = noticeOf(stop, now, at);
     return notice === null ? [] : [{ stop, notice }];
   });
   const others = othersNotice(now, new Set(own.flatMap(({ stop }) => stopTargets(stop, now))));
-  const isOne = own.length === 1 && others === null;
+  const isOne = own.length === 1 && others === null && moving === null;
   const told = own.map(({ stop, notice }) =>
     isOne ? notice : { ...notice, text: textOf(stop, notice.text, now) },
   );
-  const all = others === null ? told : [...told, others];
+  const all = [moving, ...told, others].filter((notice) => notice !== null);
   const unreachable = unreachableNotice(now, at);
   return all.length > 0 || unreachable === null ? all : [unreachable];
 }
