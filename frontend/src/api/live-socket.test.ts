@@ -343,6 +343,12 @@ test("a Stop that is asked for anew is about what the one before was about", asy
   newest().say({ type: "run", run: { ...run("lost", "2026-01-01T00:00:00Z") } });
   live.stop("all");
   expect(live.state.stops).toMatchObject([{ state: "asked", runs: ["r"] }]);
+  answering({ stop: 202 });
+  for (let n = 0; n < 3; n += 1) {
+    live.stop("all"); // each is heard, and the first one not proven
+    await vi.advanceTimersByTimeAsync(10);
+  }
+  expect(live.state.stops).toMatchObject([{ runs: ["r"] }, { runs: [] }]);
   live.close();
 });
 

@@ -107,7 +107,13 @@ test("a Stop that was heard says nothing of rest before the runner says somethin
   const one = { ...stop, awaits: "message" } as const;
   expect(noticeOf(one, ended, 1_500)?.text).toBe("Stop sent"); // it may move again
   const both = wholeNotice(
-    { ...ended, stops: [awaiting, { ...stop, provenAt: 2_000 }] },
+    {
+      ...ended,
+      stops: [
+        { ...awaiting, runs: [] },
+        { ...stop, provenAt: 2_000 },
+      ],
+    },
     NONE,
     9_000,
   );
