@@ -162,7 +162,8 @@ class OutcomeUnknown(Refused):
 
 
 class CannotStart(Exception):
-    """A process or command cannot begin its work; the message gives the reason in one sentence."""
+    """A process or command cannot begin its work, or go on with it; the message gives the reason in one
+    sentence."""
 
 
 class AnothersDatabase(CannotStart):

@@ -1,8 +1,8 @@
 """The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
-from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import AbstractAsyncContextManager
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 from typing import Annotated, Any, Final, NamedTuple
 
@@ -90,7 +90,10 @@ def application(
     ]
     runner_ports = () if runner_port is None else (runner_port, *more_runners)
     openapi = OpenApiText()
-    inner = _routed(handlers, title, lifespan, body_limit, openapi)
+    refusals: list[CannotStart] = []
+    inner = _routed(
+        handlers, title, [_noted(each, refusals) for each in lifespan], body_limit, openapi
+    )
     rights = _declared_rights(inner)
     openapi.make = lambda: document(inner, rights.needed, rights.open_paths.__contains__)
 
@@ -119,7 +122,23 @@ def application(
         relay=relay,
     )
     outer = Mounted(Requests(access, _counts(monitoring)), mount)
-    return Application(outer, openapi, access)
+    return Application(outer, openapi, access, refusals)
+
+
+def _noted(lifespan: Lifespan, refusals: list[CannotStart]) -> Lifespan:
+    """Return the same context, which notes why it cannot be entered: what starts it only hears that it
+    failed."""
+
+    @asynccontextmanager
+    async def noted(app: Litestar) -> AsyncIterator[None]:
+        try:
+            async with lifespan(app):
+                yield
+        except CannotStart as error:
+            refusals.append(error)
+            raise
+
+    return noted
 
 
 def _counts(monitoring: Monitoring | None) -> RequestCounts:
@@ -218,15 +237,30 @@ class Application:
     """The application of a process, with its OpenAPI document for programs that generate types from it.
     `access`: its access control; `entrance`: what answers other editors of the server at a listener of
     its own, None without one; `drain`: called when the process is told to end, before its connections
-    are closed, to let other processes take over."""
+    are closed, to let other processes take over; `end`: lets the process end in order, None before it
+    serves; `refusals`: why it cannot start or go on."""
 
+    end: Callable[[], None] | None = None
     entrance: ASGIApp | None = None
     drain: Callable[[], Awaitable[None]] | None = None
 
-    def __init__(self, outer: ASGIApp, openapi: OpenApiText, access: Access) -> None:
+    def __init__(
+        self,
+        outer: ASGIApp,
+        openapi: OpenApiText,
+        access: Access,
+        refusals: list[CannotStart],
+    ) -> None:
+        self.refusals: Final = refusals
         self._outer = outer
         self._openapi = openapi
         self.access: Final = access
+
+    def give_up(self, why: CannotStart) -> None:
+        """Let the process end in order, as one that cannot go on."""
+        self.refusals.append(why)
+        if self.end is not None:
+            self.end()
 
     def openapi(self) -> bytes:
         """Return the OpenAPI document as JSON. This is slow."""

@@ -78,7 +78,7 @@ def serve(
     the URL by which programs on this computer reach the process; its context is entered once the
     application is set up, and left when it shuts down. `inside`: the host and port at which other editors of
     the server reach the application's entrance. Raise CannotStart if an address is taken or
-    unknown."""
+    unknown, or if the application cannot start or go on."""
     sockets, inner = bound(host, port), []
     try:
         inner = [] if inside is None else bound(*inside, option="--cluster-listen")
@@ -100,8 +100,19 @@ def serve(
         entrance = ActivityTracker(application.entrance, connections)
         server.listen_inside(inner, _configured(entrance, None, direct=direct))
     server.drain = application.drain
+    application.end = server.end
+    # Else uvicorn would log a traceback of what is said in one sentence.
+    logging.getLogger("uvicorn.error").addFilter(
+        lambda _: server.started or not application.refusals
+    )
     when_parent_ends(server.end)
-    server.run(sockets=sockets)
+    try:
+        server.run(sockets=sockets)
+    except SystemExit:
+        if not application.refusals:
+            raise
+    if application.refusals:
+        raise application.refusals[0]
     if not server.started:
         raise CannotStart("The process could not be set up; the log above says why.")
 
