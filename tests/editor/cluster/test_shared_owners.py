@@ -8,7 +8,7 @@ import pytest
 
 from action_assistant.editor.cluster.owners import Elsewhere, Here, Nobody
 from action_assistant.editor.cluster.shared_owners import SharedOwners
-from action_assistant.errors import Conflict, Unavailable
+from action_assistant.errors import CannotStart, Conflict, Unavailable
 from action_assistant.journal.events import Addition, Draft, nothing
 from action_assistant.journal.journal import Journal
 from editor.cluster.several import have_begun
@@ -140,6 +140,7 @@ async def test_an_editor_whose_session_was_cut_takes_a_slot_again_and_goes_on(
 ) -> None:
     one, two = editors
     epoch = await one.epoch()
+    await one.owners.require_same_token(b"a token")
     # The locks of all databases of the server are listed, those of other tests too.
     slots = (
         " FROM pg_locks l JOIN pg_database d ON d.oid = l.database AND d.datname = current_database()"
@@ -156,6 +157,9 @@ async def test_an_editor_whose_session_was_cut_takes_a_slot_again_and_goes_on(
     assert await two.owners.owner(STREAM) == Elsewhere("http://one")
     assert await one.append(epoch, "1") == 1
     assert one.lost == []
+    await two.owners.require_same_token(b"a token")
+    with pytest.raises(CannotStart, match="http://one has another token"):
+        await two.owners.require_same_token(b"another token")
 
 
 async def test_an_editor_that_drains_keeps_what_it_has_until_another_needs_it_and_takes_no_more(

@@ -75,10 +75,10 @@ _BEAT: Final = text(
 _CLAIM: Final = (
     text("DELETE FROM editor WHERE life = :life AND slot <> :slot"),
     text(
-        "INSERT INTO editor (slot, life, url, version, beat_at)"
-        f" VALUES (:slot, :life, :url, :version, {_NOW}) ON CONFLICT (slot) DO UPDATE"
+        "INSERT INTO editor (slot, life, url, version, beat_at, proof)"
+        f" VALUES (:slot, :life, :url, :version, {_NOW}, :proof) ON CONFLICT (slot) DO UPDATE"
         " SET life = excluded.life, url = excluded.url, version = excluded.version,"
-        " beat_at = excluded.beat_at, draining_at = NULL"
+        " beat_at = excluded.beat_at, proof = excluded.proof, draining_at = NULL, mark = NULL, met = NULL"
     ),
     text(
         "INSERT INTO head (stream, seq, chain) VALUES (:chores, 0, :start), (:sign_in, 0, :start)"
@@ -93,7 +93,7 @@ _LEAVE: Final = (
 _SHOW_TOKEN: Final = text("UPDATE editor SET proof = :proof WHERE life = :life")
 _OTHER_TOKENS: Final = text(
     f"SELECT url FROM editor WHERE proof <> :proof AND beat_at > {_NOW} - {int(_TOKEN_COUNTS_S * 1e6)}"
-    " ORDER BY slot"
+    f" AND {HELD_SLOT.format('slot')} ORDER BY slot"
 )
 _UNKNOWN: Final = "It cannot be found out which editor has this graph: {}."
 _DRAINING: Final = "This editor is ending; try again."
@@ -110,6 +110,7 @@ class SharedOwners:
         self._database = database
         self._url = url
         self._life = secrets.token_bytes(16)
+        self._proof: bytes | None = None  # of the token
         self._loop = asyncio.get_running_loop()
         self._engine = beside(database, "owners", size=_CONNECTIONS, patience=_PATIENCE_S)
         self._mine: dict[str, int] = {}  # the epochs of the streams that this editor owns
@@ -143,6 +144,7 @@ class SharedOwners:
         does not answer. Of two that start at once with different tokens at least one is refused,
         since each shows its own before it compares."""
         proof = hmac.digest(key, b"an editor of this database", "sha256")
+        self._proof = proof  # also for another slot
         values = {"proof": proof, "life": self._life}
 
         def show(connection: Connection) -> None:
@@ -257,7 +259,7 @@ class SharedOwners:
 
         def register(connection: Connection) -> None:
             values: dict[str, Any] = {"life": self._life, "slot": self._journal.slot}
-            values |= {"url": self._url, "version": VERSION, "start": START}
+            values |= {"url": self._url, "version": VERSION, "start": START, "proof": self._proof}
             values |= {"chores": CHORES, "sign_in": SIGN_IN}
             for statement in _CLAIM:
                 connection.execute(statement, values)
