@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import partial
 from pathlib import Path
@@ -46,7 +46,7 @@ from action_assistant.editor.people.identity_provider import IdentityProvider
 from action_assistant.editor.people.people import People
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import EditorWorkers
-from action_assistant.errors import BadInput
+from action_assistant.errors import BadInput, CannotStart
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
@@ -97,10 +97,11 @@ async def open_services(
     audit: AuditLog | None = None,
     people_files: PeopleFiles | None = None,
     owners: Owners | None = None,
+    give_up: Callable[[CannotStart], object] = log.error,
 ) -> AsyncIterator[EditorServices]:
     """Return a context with the services of the editor, without its HTTP side; they are closed at
-    its end. `revoked`: the revoked sessions and links, None to read them. Raise CannotStart if the
-    database cannot be used."""
+    its end. `revoked`: the revoked sessions and links, None to read them; `give_up`: called with
+    the reason if the editor has to end. Raise CannotStart if the database cannot be used."""
     revoked = revoked or Revocations(settings.data)
     journal = await Journal.open(
         settings.database,
@@ -120,8 +121,8 @@ async def open_services(
         new = await journal.position() == 0
         async with (
             EditorWorkers.opened() as workers,
+            _owners(settings, journal, owners, give_up) as owning,  # may be refused, so it is first
             epochs.living_in(journal, settings.data) as epoch,
-            _owners(settings, journal, owners) as owning,
         ):
             people = await People.known(journal)
             services = EditorServices(
@@ -153,7 +154,10 @@ async def open_services(
 
 @asynccontextmanager
 async def _owners(
-    settings: EditorSettings, journal: Journal, given: Owners | None
+    settings: EditorSettings,
+    journal: Journal,
+    given: Owners | None,
+    give_up: Callable[[CannotStart], object],
 ) -> AsyncIterator[Owners]:
     """Return a context with the owners of graphs: those that are given, or this editor alone, or several
     editors of one database."""
@@ -165,7 +169,7 @@ async def _owners(
 
     async with SharedOwners.joined(journal, settings.database, settings.cluster.url) as owners:
         await owners.require_same_token(Keys.of(settings.data).relay_key)
-        async with in_one_folder(journal, settings.data):
+        async with in_one_folder(journal, settings.data, give_up):
             yield owners
 
 
@@ -239,7 +243,9 @@ def create_app(settings: EditorSettings, owners: Owners | None = None) -> Applic
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_services(settings, revoked, audit, people_files, owners) as services:
+        async with open_services(
+            settings, revoked, audit, people_files, owners, made.give_up
+        ) as services:
             app_state.open(services)
             async with monitoring.watching(WatchedEditor(services)):
                 yield

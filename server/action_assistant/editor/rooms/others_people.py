@@ -13,6 +13,7 @@ from sqlalchemy import Connection, text
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.postgres import HELD_SLOT
 from action_assistant.web.auth.keys import PersonRef
 
 _ALIVE_US: Final = 2_000_000  # since the last beat of an editor that counts
@@ -20,7 +21,8 @@ _READ: Final = text(
     "SELECT r.stream, r.life, r.people, e.slot = :slot AS is_ours"
     " FROM room r JOIN editor e ON e.life = r.life"
     " WHERE e.slot = :slot OR (r.people IS NOT NULL AND e.beat_at >"
-    f" (extract(epoch FROM clock_timestamp()) * 1000000)::bigint - {_ALIVE_US})"
+    f" (extract(epoch FROM clock_timestamp()) * 1000000)::bigint - {_ALIVE_US}"
+    f" AND {HELD_SLOT.format('e.slot')})"
 )
 _WRITE: Final = text("UPDATE room SET people = :people WHERE stream = :stream AND life = :life")
 
