@@ -220,9 +220,13 @@ test("a Stop is heard although the socket fails just then", async () => {
 
 test("a Stop that nobody hears is sent again until somebody does", async () => {
   const live = opened(run("running"));
+  const bodies: { stop_id: string; again: boolean }[] = [];
   let dead = true;
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
-    if (init.method === "POST") posted("POST", url);
+    if (init.method === "POST") {
+      posted("POST", url);
+      bodies.push(JSON.parse(String(init.body)));
+    }
     if (dead) throw new TypeError("no network");
     return Response.json({ runs: [] }, { status: 202 });
   });
@@ -239,6 +243,9 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
   const heard = posted.mock.calls.length;
   await vi.advanceTimersByTimeAsync(10_000);
   expect(posted.mock.calls.length).toBe(heard);
+  // So the runner tells another try from another press.
+  expect(new Set(bodies.map(({ stop_id }) => stop_id)).size).toBe(1);
+  expect(bodies.map(({ again }) => again)).toEqual(bodies.map((_, n) => n > 0));
   live.close();
 });
 

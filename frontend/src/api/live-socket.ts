@@ -163,8 +163,8 @@ export class LiveSocket {
    * Sends Stop over the socket and by POST at once: whichever arrives first counts. While nobody
    * hears it, it is sent again for as long as the page is open.
    */
-  stop(run: string | "all", id: string = newAid()): void {
-    const first = this.#sendStop(run, id); // before all else: nothing that fails here keeps it back
+  stop(run: string | "all", id: string = newAid(), again = false): void {
+    const first = this.#sendStop(run, id, again); // before all else: nothing that fails here keeps it back
     const meant = openRuns(this.state).filter((each) => isMeant(each, run));
     const runs = meant.map((each) => each.id);
     const stop: StopRequest = { id, run, at: tick(), runs, state: "asked", detail: "" };
@@ -174,7 +174,7 @@ export class LiveSocket {
 
   /** "all" is sent as such until it is heard: a run may have begun before it that this page has not seen. */
   async #keepStopping({ id, run }: StopRequest, first: Promise<Stopping>): Promise<void> {
-    for (let sent = first; ; sent = this.#sendStop(run, id)) {
+    for (let sent = first; ; sent = this.#sendStop(run, id, true)) {
       await sent.then(
         (answer) => this.#answerStop(id, "heard", "", { answer, awaits: "message" }),
         (error) =>
@@ -189,10 +189,10 @@ export class LiveSocket {
     }
   }
 
-  async #sendStop(run: string, id: string): Promise<Stopping> {
-    const posted = postStop(this.#runner, run, id); // first: a socket that fails keeps it from nothing
+  async #sendStop(run: string, id: string, again: boolean): Promise<Stopping> {
+    const posted = postStop(this.#runner, run, id, again); // first: a socket that fails keeps it from nothing
     if (this.#socket?.readyState === WebSocket.OPEN) {
-      const message: PageMessage = { type: "stop", run, stop_id: id };
+      const message: PageMessage = { type: "stop", run, stop_id: id, again };
       try {
         this.#socket.send(JSON.stringify(message));
       } catch (error) {
@@ -221,7 +221,8 @@ export class LiveSocket {
   /** Takes over what is known of the runner from its former address, and sends on each Stop that nobody has answered. */
   takeOver({ runs: theirs, engines, stops }: LiveState): void {
     const isNew = ({ id }: StopRequest) => this.state.stops.every((own) => own.id !== id);
-    for (const stop of stops) if (isWaiting(stop) && isNew(stop)) this.stop(stop.run, stop.id);
+    for (const stop of stops)
+      if (isWaiting(stop) && isNew(stop)) this.stop(stop.run, stop.id, true);
     const { link, runs, engines: own } = this.state;
     const others = [...theirs.values()].filter(({ id }) => !runs.has(id));
     const isUnseen = ({ ended_at }: Run) => link === "live" && ended_at === null;

@@ -43,14 +43,15 @@ export function needsRestConfirmation(run: Run): boolean {
   return Boolean(run.unconfirmed) && !moves;
 }
 
-/** Asks to stop one run, or all of them. Throws if what answers does not say which runs it stops. */
+/** Asks to stop one run, or all of them; `again`: this press was sent before. Throws if what answers does not say which runs it stops. */
 export async function postStop(
   runner: string,
   run: string | "all",
   stop: string,
+  again = false,
 ): Promise<RunnerApi["Stopping"]> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
-  const request = { method: "POST", body: { stop_id: stop }, timeoutMs: 3_000 } as const;
+  const request = { method: "POST", body: { stop_id: stop, again }, timeoutMs: 3_000 } as const;
   const answer: unknown = await (await fetchAnswer(`${runner}${path}`, request)).json();
   const runs = (answer as { runs?: unknown } | null)?.runs;
   if (!Array.isArray(runs) || runs.some((each) => typeof each !== "string"))

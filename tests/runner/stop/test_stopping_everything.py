@@ -69,11 +69,11 @@ async def test_a_repeat_of_a_stop_reaches_no_run_that_was_admitted_since_it_firs
         first = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
         await anyio.sleep(5)
         assert control.stop_all(BEN, "press").runs == [first]
-        assert control.stop_all(BEN, "press").runs == [first]
+        assert control.stop_all(BEN, "press", again=True).runs == [first]
         await until(lambda: first not in control.open)
         second = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
         await anyio.sleep(5)
-        assert control.stop_all(BEN, "press").runs == []
+        assert control.stop_all(BEN, "press", again=True).runs == []
         assert control.open[second].run.desired == "running"
         assert told == ["ben"]
         assert control.stop_all(BEN, "another press").runs == [second]
@@ -88,7 +88,7 @@ async def test_a_repeat_of_a_stop_holds_no_start_back_that_was_asked_for_after_i
         harness.journal.slow = 1.0
         tasks.start_soon(control.start, order(sequence(), engine="Farah"), ANN)
         await anyio.sleep(0.5)
-        control.stop_all(BEN, "press")
+        control.stop_all(BEN, "press", again=True)
         await until(lambda: bool(control.open))
         (opened,) = control.open.values()
         await opened.published.wait()
@@ -101,7 +101,18 @@ async def test_a_press_whose_id_says_nothing_is_a_stop_of_its_own(stop_id: str) 
     async with fleet(Harness(), Farah=Open(NEVER)) as control:
         control.stop_all(BEN, stop_id)
         run = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
-        assert control.stop_all(BEN, stop_id).runs == [run]
+        assert control.stop_all(BEN, stop_id, again=True).runs == [run]
+
+
+@virtual
+async def test_a_program_that_gives_all_its_presses_one_id_stops_with_each() -> None:
+    async with fleet(Harness(), Farah=Open(NEVER)) as control:
+        control.stop_all(BEN, "press")
+        run = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
+        text = await Hub(control, clock_us).follow(
+            '{"type":"stop","run":"all","stop_id":"press"}', BEN
+        )
+        assert json.loads(text)["runs"] == [run]
 
 
 @virtual
@@ -109,10 +120,10 @@ async def test_an_id_of_another_person_or_of_long_ago_is_a_stop_of_its_own() -> 
     async with fleet(Harness(), Farah=Open(NEVER), Eve=Open(NEVER)) as control:
         control.stop_all(BEN, "press")
         first = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
-        assert control.stop_all(ANN, "press").runs == [first]
+        assert control.stop_all(ANN, "press", again=True).runs == [first]
         second = (await control.start(order(sequence(), engine="Eve"), ANN)).run.id
         await anyio.sleep(3600)
-        assert control.stop_all(BEN, "press").runs == [second]
+        assert control.stop_all(BEN, "press", again=True).runs == [second]
 
 
 @virtual

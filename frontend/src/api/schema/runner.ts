@@ -3335,23 +3335,26 @@ export interface RunnerApi {
     /**
      * StopBody
      * @description The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
-     *     on several ways. A program gives each press another one, or none: for an hour, a Stop of everything
-     *     with an id of before, of the same person, reaches no run that was admitted since that first came.
+     *     on several ways. `again`: this is another try to send that press, since no answer came; a Stop of
+     *     everything that has come before then reaches no run that was admitted since.
      */
     StopBody: {
         /** @default  */
         stop_id?: string;
+        /** @default false */
+        again?: boolean;
     };
     /**
      * StopMessage
      * @description A press of Stop. `run`: the id of a run or a group, or
-     *     "all"; `stop_id`: the id of the press, as in the body of `POST /api/stop`.
+     *     "all"; `stop_id` and `again`: as in the body of `POST /api/stop`.
      */
     StopMessage: {
         /** @enum {string} */
         type: "stop";
         run: string;
         stop_id: string;
+        again: boolean;
     };
     /**
      * Stopping

@@ -64,10 +64,11 @@ _LONGEST: Final = 10_000  # characters of a message from the page
 
 class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
     """A press of Stop. `run`: the id of a run or a group, or
-    "all"; `stop_id`: the id of the press, as in the body of `POST /api/stop`."""
+    "all"; `stop_id` and `again`: as in the body of `POST /api/stop`."""
 
     run: str
     stop_id: str = ""
+    again: bool = False
 
 
 class HereMessage(msgspec.Struct, frozen=True, tag="here", tag_field="type"):
@@ -406,7 +407,7 @@ class Hub:
             if denied:
                 raise Forbidden(denied)
             if message.run == "all":
-                stopped = self.control.stop_all(author, stop_id)
+                stopped = self.control.stop_all(author, stop_id, message.again)
                 return _text(Stopping.everything(stop_id, stopped, unseen))
             runs = await self.control.stop(message.run, author, stop_id)
         except (msgspec.DecodeError, RecursionError, UnicodeError) as wrong:

@@ -94,10 +94,11 @@ _Asking = Request[Any, Any, Any]
 
 class StopBody(msgspec.Struct, frozen=True):
     """The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
-    on several ways. A program gives each press another one, or none: for an hour, a Stop of everything
-    with an id of before, of the same person, reaches no run that was admitted since that first came."""
+    on several ways. `again`: this is another try to send that press, since no answer came; a Stop of
+    everything that has come before then reaches no run that was admitted since."""
 
     stop_id: str = ""
+    again: bool = False
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
@@ -198,9 +199,9 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("stop")],
     )
     async def stop_all(request: _Asking) -> Stopping:
-        stop_id = await _stop_id(request)
-        stopped = services.control.stop_all(author_of(request), stop_id)
-        return Stopping.everything(stop_id, stopped, partial(unseen_by, services, request))
+        body = await _stop_body(request)
+        stopped = services.control.stop_all(author_of(request), body.stop_id, body.again)
+        return Stopping.everything(body.stop_id, stopped, partial(unseen_by, services, request))
 
     @post(
         "/api/runs/{run:str}/stop",
@@ -211,7 +212,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("stop")],
     )
     async def stop(run: str, request: _Asking) -> Stopping:
-        stop_id = await _stop_id(request)
+        stop_id = (await _stop_body(request)).stop_id
         return Stopping(stop_id, await services.control.stop(run, author_of(request), stop_id))
 
     @post(
@@ -421,14 +422,14 @@ def _rules(services: RunnerServices) -> ControllerRouterHandler:
     return store
 
 
-async def _stop_id(request: _Asking) -> str:
-    """Return the `stop_id` in the body of a Stop request, at most 100 characters; "" for any other
-    body: a Stop is never refused for its form. Wait for the body only a short time."""
+async def _stop_body(request: _Asking) -> StopBody:
+    """Return the body of a Stop request, with an id of at most 100 characters; an empty one for any
+    other body: a Stop is never refused for its form. Wait for the body only a short time."""
     try:
-        body = await start_of(request, _STOP_BYTES, _STOP_S)
-        return msgspec.json.decode(body, type=StopBody).stop_id[:100]
+        body = msgspec.json.decode(await start_of(request, _STOP_BYTES, _STOP_S), type=StopBody)
     except (msgspec.DecodeError, UnicodeDecodeError, HTTPException, BadInput, RecursionError):
-        return ""
+        return StopBody()
+    return StopBody(body.stop_id[:100], body.again)
 
 
 async def _run_view(services: RunnerServices, run: Run) -> views.RunShown:

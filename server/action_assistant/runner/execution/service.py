@@ -362,11 +362,11 @@ class ExecutionService:
 
     # --- stop, pause, resume ------------------------------------------------------------------
 
-    def stop_all(self, author: Author, stop_id: str = "") -> StoppedAll:
+    def stop_all(self, author: Author, stop_id: str = "", again: bool = False) -> StoppedAll:
         """Begin to stop all runs and all graphs of other programs. Return which are being stopped, and the
-        robots that cannot be reached. The call never waits. `stop_id`: the id of the press; a repeat of
-        it reaches no run that was admitted since it first came."""
-        newest = self._stops.note_all(author, stop_id, self._runs.last_number)
+        robots that cannot be reached. The call never waits. `stop_id`: the id of the press; `again`: it is
+        sent once more, and reaches no run that was admitted since it first came."""
+        newest = self._stops.note_all(author, stop_id, again, self._runs.last_number)
         if newest is None:
             self._tell_of_stop(author, "", "")
         try:

@@ -64,14 +64,14 @@ class StopOrder:
         self._newest[what] = self.count, author, stop_id
         _merge_oldest(self._newest, self._most)
 
-    def note_all(self, author: Author, stop_id: str, newest: int) -> int | None:
+    def note_all(self, author: Author, stop_id: str, again: bool, newest: int) -> int | None:
         """Count a Stop of everything while the newest run has the number `newest`, and return None. If it
-        is a repeat of one that came within the last hour, count nothing, and return the number of
-        the newest run at that time. One without an id, or whose id may have been cut, is no repeat.
+        is sent `again`, and came within the last hour, count nothing, and return the number of the
+        newest run at that time. One without an id, or whose id may have been cut, is a Stop of its own.
         Nothing of this is stored: after a restart a repeat stops too much, and never too little."""
         key, now = (author.id, stop_id), asyncio.get_running_loop().time()
         first, came = self._presses.get(key) or (0, -inf)
-        if 0 < len(stop_id) < _WHOLE_ID and now - came < _REPEATS_S:
+        if again and 0 < len(stop_id) < _WHOLE_ID and now - came < _REPEATS_S:
             return first
         self._presses.put(key, (newest, now))
         self.note("", author, stop_id)
