@@ -37,10 +37,18 @@ const GRAPH = {
   ],
 };
 
-async function open(page: Page): Promise<string> {
+/** Cards name their robot where a graph has several. */
+const TWO_ROBOTS = {
+  ...GRAPH,
+  actions: GRAPH.actions.map((each) =>
+    each.name === "Look" ? { ...each, actor: "camera" } : each,
+  ),
+};
+
+async function open(page: Page, graph: object = GRAPH): Promise<string> {
   const { id } = await product.ask<{ id: string }>("/api/graphs", {
     method: "POST",
-    body: JSON.stringify(GRAPH),
+    body: JSON.stringify(graph),
     headers: { "content-type": "application/json" },
   });
   await page.goto(`${product.url}/graphs/${id}`);
@@ -82,7 +90,7 @@ test("edited JSON is marked where it is wrong, applied as one change, and undone
 }) => {
   test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
-  const id = await open(page);
+  const id = await open(page, TWO_ROBOTS);
   await card(page, "Grip").click({ position: { x: 50, y: 30 } });
   await page.getByRole("tab", { name: "JSON" }).click();
   await expect(json(page)).toContainText('"name": "Grip"');
@@ -129,7 +137,7 @@ test("what somebody changed while one typed is asked about, never written over",
   test.skip(LONG !== "", LONG);
   const ada = await product.person(browser, "Ada");
   const mari = await product.person(browser, "Mari");
-  const id = await open(ada.page);
+  const id = await open(ada.page, TWO_ROBOTS);
   await mari.page.goto(`${product.url}/graphs/${id}`);
   await saved(mari.page);
 
@@ -215,7 +223,7 @@ test("a parameter is renamed, retyped, limited to values, and a pose is added as
   await expect(
     page.getByText("“near” is no number. The last valid value, 0.5, is kept."),
   ).toBeVisible();
-  await saved(page);
+  await expect(page.getByText("1 draft not saved", { exact: true })).toBeVisible(); // all else is
   const inputs = (await file(id)).actions[1]?.input_parameters ?? {};
   expect(inputs.paint).toEqual({
     pvf_type: "string",

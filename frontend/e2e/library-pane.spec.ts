@@ -80,7 +80,7 @@ test("a finger places a graph, and a phone has it in the search", async ({ brows
   await small.page.getByRole("button", { name: "Add an action" }).tap();
   await small.page.getByRole("combobox", { name: "Name of an action" }).fill("wash_h");
   await small.page.getByRole("option", { name: /^wash_hall/ }).tap();
-  await expect(small.page.getByRole("row", { name: /^wash_hall / })).toBeVisible();
+  await expect(small.page.getByRole("row", { name: "wash_hall", exact: true })).toBeVisible();
   await saved(small.page);
   expect(small.failures).toEqual([]);
   await small.context.close();

@@ -17,7 +17,9 @@ async function addParameter(page: Page, name: string, type: string): Promise<voi
   await page.getByRole("combobox", { name: "Type of the parameter" }).click();
   await page.getByRole("option", { name: type, exact: true }).click();
   await page.locator("form").getByRole("button", { name: "Add", exact: true }).click();
-  await expect(page.getByRole("button", { name: `What the parameter ${name} is` })).toBeVisible();
+  const rows = type === "pose"; // its numbers stand in rows, with one button for all of them
+  const more = rows ? `The numbers of ${name} one by one` : `What the parameter ${name} is`;
+  await expect(page.getByRole("button", { name: more })).toBeVisible();
 }
 
 async function renameParameter(page: Page, from: string, to: string): Promise<void> {

@@ -23,6 +23,10 @@ test("what is on screen is sent to the running robot, after what becomes differe
   await saved(page);
   await give(page, "Wait", "delay", "0.5");
   await saved(page);
+  // Opened before the run begins, which takes 40 s only.
+  const other = await product.person(browser, "Mari");
+  await other.page.goto(page.url());
+  await saved(other.page);
   await start(page);
   const newest = async () => (await product.ask<Run[]>("/api/runs", {}, product.runnerUrl))[0];
   await expect.poll(async () => (await newest())?.state).toBe("running");
@@ -38,9 +42,6 @@ test("what is on screen is sent to the running robot, after what becomes differe
   await expect(changes).toContainText('Action Wait_0 changeddelay: "0.5" → "0.9"');
   await page.screenshot({ path: test.info().outputPath("send-change.png") });
   // What somebody else changes meanwhile is neither sent nor listed.
-  const other = await product.person(browser, "Mari");
-  await other.page.goto(page.url());
-  await saved(other.page);
   await add(other.page, "Theirs");
   await saved(other.page);
   await expect(card(page, "Theirs")).toBeAttached(); // the page has followed
