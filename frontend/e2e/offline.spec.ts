@@ -137,7 +137,7 @@ test("on a shared tablet nobody's edits are sent under another name", async ({ b
   // She is told whose it is, and may save it for Ada.
   await expect(other.getByText("1 change of Ada waits on this device")).toBeVisible();
   await other.getByRole("button", { name: "Look", exact: true }).click();
-  const dialog = other.getByRole("dialog", { name: /Changes of others/ });
+  const dialog = other.getByRole("dialog", { name: /^Unsaved changes that other people made/ });
   const downloading = other.waitForEvent("download");
   await dialog.getByRole("button", { name: "Save as a file" }).click();
   const file = JSON.parse(readFileSync(await (await downloading).path(), "utf8"));
@@ -230,7 +230,9 @@ test("the page opens without a server, with what the device keeps, and says what
   await expect(card(page, "Kept")).toBeVisible();
   await add(page, "Alone");
   await offline(page, 1);
-  await expect(page.getByRole("button", { name: /^Run v1: not connected/ })).toBeDisabled();
+  await expect(
+    page.getByRole("button", { name: "Run v1: The runner does not answer" }),
+  ).toBeDisabled();
   await page.getByRole("button", { name: /^Stop everything/ }).click();
   await expect(page.getByText(/NOT SENT|MAY REACH NOBODY/).first()).toBeVisible();
   await page.screenshot({ path: test.info().outputPath("offline.png") });

@@ -67,7 +67,7 @@ test("a one-sided arrow says what it would do, is mended, and the mending is und
   await expect(page.getByRole("button", { name: /^Run v1: 2 wrong/ })).toBeDisabled();
 
   // In the panel: consequence, place to jump to, fix, and the code last.
-  await page.getByTitle("2 wrong: this prevents a start").click();
+  await page.locator("button[title='2 wrong: this prevents a start']").click();
   const first = page.locator("li[data-code=H2]").filter({ hasText: "Look → Grip" });
   await expect(first).toContainText("the engine and every running graph with it abort");
   await first.getByRole("button", { name: "Show Look → Grip" }).click();
