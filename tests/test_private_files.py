@@ -86,6 +86,15 @@ def test_a_folder_of_an_older_version_is_closed_and_doctor_tells(tmp_path: Path)
     assert "folder-readable" not in told()
 
 
+def test_the_locks_of_editors_in_containers_let_a_folder_be_closed(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    data.mkdir(mode=0o755)
+    for name in ("editor.db", "editor-1.lock", "editor-12.lock"):
+        (data / name).touch(mode=0o644)
+    own_folder(data)
+    assert modes(data) == {}
+
+
 def test_a_folder_with_other_things_in_it_is_left_as_it_is(tmp_path: Path) -> None:
     """The folder may be a person's home, or one that belongs to all."""
     home = tmp_path / "home"

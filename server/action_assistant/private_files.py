@@ -20,7 +20,7 @@ _T = TypeVar("_T")
 
 #: The names of files and folders that this program creates in a data folder.
 _OURS: Final = re.compile(
-    r"(editor|runner)\.(address|database|db|mark).*|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
+    r"(editor|runner)\.(address|database|db|mark).*|editor-\d+\.lock|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
     r"|revoked|sessions|people|passkeys|released|confirmed|tokens|views|runners\.json.*|graph-(rules|sights)\.json.*|tls|archive|recordings|photos|before-(restore-|move-|upgrade).*|\.(backup|restore|rehearsal|move)-.*"
     r"|backups\.json.*|\.backups\.json\.part"
 )
