@@ -2,13 +2,21 @@
 
 import asyncio
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from action_assistant.errors import Conflict, NotFound, Refused, TooMany, Unavailable
+from action_assistant.errors import (
+    Conflict,
+    NotFound,
+    OutcomeUnknown,
+    Refused,
+    TooMany,
+    Unavailable,
+)
 from action_assistant.web.auth.desk import Held
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person
@@ -114,6 +122,33 @@ def test_a_full_disk_loses_no_confirmed_login(tokens: TokenFiles) -> None:
         with pytest.raises(Unavailable):
             await claim(Held(codes), begun.secret, full)
         assert (await fetched(codes, begun.secret, tokens)).state == "granted"
+
+    asyncio.run(played())
+
+
+class Lost(Held[LoginCodes]):
+    """The codes in another editor, which is gone when it is told that the token is made."""
+
+    async def call(self, method: Any, *arguments: Any, **named: Any) -> Any:
+        """Call it, or lose its answer."""
+        if method is LoginCodes.end_fetch:
+            raise OutcomeUnknown("The editor has ended, and may have done it before that.")
+        return await super().call(method, *arguments, **named)
+
+
+def test_a_token_that_was_made_reaches_its_program(tokens: TokenFiles) -> None:
+    async def make(said: Confirmed) -> MadeToken:
+        return tokens.make(said.by, said.name, said.scopes, said.days)
+
+    async def played() -> None:
+        codes = LoginCodes()
+        begun = codes.begin("cli", ("read",), None, "")
+        codes.confirm(begun.code, word())
+        granted = await claim(Lost(codes), begun.secret, make)
+        assert granted.made is not None
+        assert tokens.opens(granted.made.token) is not None
+        assert (await fetched(codes, begun.secret, tokens)).state == "gone"
+        assert len(tokens.every()) == 1
 
     asyncio.run(played())
 

@@ -248,7 +248,8 @@ async def claim(
         with contextlib.suppress(Refused):
             await codes.call(LoginCodes.cancel, secret)
         raise
-    await codes.call(LoginCodes.end_fetch, secret, is_made=True)
+    with contextlib.suppress(Refused):  # nobody else gets the token that is made: the code expires
+        await codes.call(LoginCodes.end_fetch, secret, is_made=True)
     return replace(fetching.claimed, made=made)
 
 
