@@ -39,7 +39,7 @@ class RemoteTurns:
         made, turn = random_id(), _Turn()
         task = turn.done = asyncio.create_task(self._take(stream, author, turn))
         self._turns[made] = turn
-        task.add_done_callback(lambda _: self._turns.pop(made, None))
+        task.add_done_callback(lambda _: self._over(made, task))
         try:
             waiting: list[asyncio.Future[Any]] = [task, turn.begun]
             await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
@@ -63,6 +63,13 @@ class RemoteTurns:
         turn = self._turns.pop(made, None)
         if turn is not None:
             turn.update.cancel()
+
+    def _over(self, made: str, task: asyncio.Task[int]) -> None:
+        """Forget a turn. Whoever waits for its edit is told why there is none; else nobody asks for that, and
+        asyncio would log it."""
+        self._turns.pop(made, None)
+        if not task.cancelled():
+            task.exception()
 
     async def _take(self, stream: str, author: str, turn: _Turn) -> int:
         async with self._rooms().enter(stream) as room:
