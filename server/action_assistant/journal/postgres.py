@@ -117,6 +117,13 @@ _END_OLD: Final = """
 SELECT pg_terminate_backend(pid) FROM pg_stat_activity
 WHERE application_name = $1 AND pid <> pg_backend_pid()
 """
+#: While others are beside, a change of tables waits this long for a table: their queries wait behind it, and
+#: an editor that stores no beat for 1.5 s closes its rooms (decision 174).
+_TABLE_WAIT: Final = "SET LOCAL lock_timeout = '500ms'"
+_TRIES: Final = 8  # of such a change
+_PAUSE: Final = 1.0  # seconds between two, in which the others go on
+#: SQLSTATE of a statement that waited for a lock for longer than `lock_timeout`.
+_LOCKED: Final = "55P03"
 #: SQLSTATE of a deadlock, and of a transaction that others have overtaken.
 _RACES: Final = ("40P01", "40001")
 #: SQLSTATE classes that speak of the server: connection, resources, operator, system, internal.
@@ -315,8 +322,9 @@ class Postgres:
         changes the tables, and no other code alters them."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Call `upgrade`, which changes the schema, in one transaction, and return its result.
-        Raise CannotStart if the database cannot be used."""
+        """Call `upgrade`, which changes the schema, in one transaction, and return its result. If it
+        limits how long it waits for a table (`_alone`) and that is too short, try again a few times. Raise
+        CannotStart if the database cannot be used, or a table is in use each time."""
 
         async def change() -> T:
             engine = engine_of(self._url, {}, self._failover, poolclass=NullPool)
@@ -327,10 +335,19 @@ class Postgres:
             finally:
                 await engine.dispose()
 
-        try:
-            return asyncio.run(change())
-        except self.faults as error:
-            raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
+        for left in reversed(range(_TRIES)):
+            try:
+                return asyncio.run(change())
+            except self.faults as error:
+                if _state_of(error) != _LOCKED:
+                    raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
+                if not left:
+                    raise CannotStart(
+                        f"{self.name}: this version has to change tables that somebody reads for long, such "
+                        "as a backup; start it again when that has ended."
+                    ) from error
+            time.sleep(_PAUSE)
+        raise AssertionError
 
     def connect(self) -> PostgresSession:
         """Connect, become the only writer (again), and return the session. Once it has the lock,
@@ -413,8 +430,7 @@ class Postgres:
 
     def raced(self, error: Exception) -> bool:
         """Return whether others, in a shared database, wrote at the same time."""
-        cause: Any = error.orig if isinstance(error, DBAPIError) else error
-        return self._several and getattr(cause, "sqlstate", None) in _RACES
+        return self._several and _state_of(error) in _RACES
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Call `question` with a connection that is not the writer's, and return its result."""
@@ -528,9 +544,17 @@ async def _until(ask: Callable[[], Awaitable[bool]], why_not: str) -> None:
         await asyncio.sleep(0.05)
 
 
+def _state_of(error: Exception) -> str | None:
+    """Return the SQLSTATE of an error, None if it has none."""
+    cause: object = error.orig if isinstance(error, DBAPIError) else error
+    return getattr(cause, "sqlstate", None)
+
+
 def _alone(before: Before) -> Before:
     """Return a function that is called before tables change, and refuses that while other editors use
-    them, unless these can go on; else it calls `before`."""
+    them, unless these can go on; then the change must not wait long for a table. Else it calls `before`."""
+
+    called_for: set[str] = set()
 
     def check(connection: Connection, branch: Branch, revision: str) -> None:
         beside = connection.exec_driver_sql(_EDITORS).scalar_one() > 1
@@ -539,7 +563,11 @@ def _alone(before: Before) -> Before:
                 "This version has to change the tables, but other editors use them and could not go on: end "
                 "those first."
             )
-        before(connection, branch, revision)
+        if revision not in called_for:  # one copy is enough for all tries
+            before(connection, branch, revision)
+            called_for.add(revision)
+        if beside:
+            connection.exec_driver_sql(_TABLE_WAIT)
 
     return check
 

@@ -17,10 +17,11 @@ from action_assistant.journal.postgres import HELD_SLOT
 from action_assistant.web.auth.keys import PersonRef
 
 _ALIVE_US: Final = 2_000_000  # since the last beat of an editor that counts
+#: Editors of the version before, which have no mark, leave there the people of whoever owned a stream before them.
 _READ: Final = text(
     "SELECT r.stream, r.life, r.people, e.slot = :slot AS is_ours"
     " FROM room r JOIN editor e ON e.life = r.life"
-    " WHERE e.slot = :slot OR (r.people IS NOT NULL AND e.beat_at >"
+    " WHERE e.slot = :slot OR (r.people IS NOT NULL AND e.mark IS NOT NULL AND e.beat_at >"
     f" (extract(epoch FROM clock_timestamp()) * 1000000)::bigint - {_ALIVE_US}"
     f" AND {HELD_SLOT.format('e.slot')})"
 )

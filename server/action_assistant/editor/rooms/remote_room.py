@@ -57,12 +57,17 @@ class RemoteRoom:
         self, author: str, compute: Callable[[bytes, int], Awaitable[bytes]]
     ) -> int:
         """Do what `Room.submit_in_turn` does; the time for `compute` includes the way to the other
-        editor. Raise OutcomeUnknown, too, if the answer was lost."""
+        editor. At an editor of the version before, edits of others do not wait. Raise OutcomeUnknown, too, if the answer was lost."""
         begin = Call("GET", f"{self._target}?{urlencode({TURN: author})}", is_inner=True)
         headers, state = await self._ask(begin)
+        before = int(headers[SEQ])
+        if (
+            TURN_HEADER not in headers
+        ):  # an editor of the version before, whose rooms wait for nobody
+            return await self.submit(await compute(state, before), author, before)
         turn = f"{self._target}?{urlencode({TURN: headers[TURN_HEADER]})}"
         try:
-            update = await compute(state, int(headers[SEQ]))
+            update = await compute(state, before)
         except BaseException:
             with suppress(Refused):  # or the room goes on by itself
                 await self._ask(Call("DELETE", turn, is_inner=True))
