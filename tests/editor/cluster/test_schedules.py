@@ -2,7 +2,6 @@
 that was acknowledged is lost, nothing is doubled or damaged, no slot has gaps, and no owner writes after another."""
 
 import asyncio
-import contextlib
 import multiprocessing
 import os
 import random
@@ -85,16 +84,17 @@ def live(url: str, name: str, out: Path) -> None:
         while not ended.is_set():
             try:
                 journal = await Journal.open(url, branch="editor", fold=nothing, several=True)
-                break
             except CannotStart:
                 await asyncio.sleep(0.1)
-        else:
-            return
-        with contextlib.suppress(Unavailable):
-            await have_begun(journal, *_STREAMS)
-            async with SharedOwners.joined(journal, url, f"http://{name}") as owners:
-                await Writer(journal, owners, name, out).write(ended)
-        await journal.close()
+                continue
+            try:
+                await have_begun(journal, *_STREAMS)
+                async with SharedOwners.joined(journal, url, f"http://{name}") as owners:
+                    await Writer(journal, owners, name, out).write(ended)
+            except Unavailable:  # the server went away before it had joined
+                await asyncio.sleep(0.1)
+            finally:
+                await journal.close()
 
     asyncio.run(be())
 
