@@ -17,6 +17,7 @@ vi.mock("../api/page-link", () => ({
 
 let root: Root;
 let deleted: string[];
+let answers: boolean;
 
 afterEach(() => {
   act(() => root.unmount());
@@ -26,9 +27,11 @@ afterEach(() => {
 /** Opens the panel; returns what presses Sign out. */
 async function opened(): Promise<() => Promise<void>> {
   deleted = [];
+  answers = true;
   vi.stubGlobal("fetch", (url: string, { method }: RequestInit) => {
     if (method === "DELETE") deleted.push(url);
-    return new Promise(() => undefined); // nobody answers
+    if (!answers) return Promise.reject(new TypeError("no answer"));
+    return new Promise(() => undefined); // not yet
   });
   const person = { person: { id: "a", name: "Ada", role: "viewer", personal: true } };
   root = createRoot(document.body.appendChild(document.createElement("div")));
@@ -61,6 +64,22 @@ test("while a STOP ALL is not proven, signing out says first that it would be se
   await signOut();
   expect(deleted).toEqual([]);
   expect(document.querySelector("[role=alert]")?.textContent).toContain("A Stop is not proven");
+  await signOut();
+  expect(deleted).toHaveLength(2);
+});
+
+test("who could not sign out before is told, too, that a STOP ALL is not proven", async () => {
+  link.isStopping = false;
+  const signOut = await opened();
+  answers = false;
+  await signOut();
+  const said = () => document.querySelector("[role=alert]")?.textContent;
+  await vi.waitFor(() => expect(said()).toContain("could not end this session"));
+  link.isStopping = true;
+  deleted = [];
+  await signOut();
+  expect(deleted).toEqual([]);
+  expect(said()).toContain("STOP ALL is not proven");
   await signOut();
   expect(deleted).toHaveLength(2);
 });

@@ -108,7 +108,7 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
     }
   };
   const leave = async () => {
-    if (live?.isStopping && obstacle === "") return setObstacle(UNPROVEN);
+    if (live?.isStopping && obstacle !== UNPROVEN) return setObstacle(UNPROVEN);
     try {
       await signOut(runner);
       await onLeave(person.id);
