@@ -94,8 +94,13 @@ export async function registerRobot(runner: string, robot: Registration): Promis
   return runnerOnlyAt(runner).post("/api/robots", { body: robot });
 }
 
-/** Starts an emulated robot on the computer of the runner, and registers it. */
-export function startPracticeRobot(runner: string): Promise<Robot> {
+/** The name of the robot that a runner starts for practice. */
+export const PRACTICE = "Practice";
+
+/** Starts an emulated robot on the computer of the runner, and registers it. Throws as `registerRobot` does. */
+export async function startPracticeRobot(runner: string): Promise<Robot> {
+  const taken = takenElsewhere(PRACTICE, runner);
+  if (taken !== "") throw new Error(taken);
   return runnerOnlyAt(runner).post("/api/practice", {});
 }
 

@@ -11,6 +11,7 @@ import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import {
   type FoundEngine,
+  PRACTICE,
   type Registration,
   startPracticeRobot,
   useFoundEngines,
@@ -41,9 +42,6 @@ interface Props {
   onImport: (text: string, name: string) => void;
 }
 
-/** The name of the robot that the runner starts for practice. */
-const PRACTICE = "Practice";
-
 function PracticeButton({ runner, again = false }: { runner: string; again?: boolean }) {
   const client = useQueryClient();
   const start = useMutation({
@@ -64,8 +62,9 @@ function PracticeButton({ runner, again = false }: { runner: string; again?: boo
   );
 }
 
-/** Says why the practice robot is gone, and starts it again. */
+/** Says why the practice robot of a runner is gone, and starts it again there. */
 function PracticeEnded({ runner }: { runner: string }) {
+  if (useRosReach(runner).data?.no_reach !== "") return null;
   return (
     <div className="row-wrap gap-50">
       <PracticeButton runner={runner} again />
@@ -171,9 +170,12 @@ export function RobotsPage({ onImport }: Props) {
                   onEdit={(robot) => setEditing({ robot, isNew: false })}
                   onImport={onImport}
                   wayBack={
-                    mayPractise &&
+                    may &&
                     runner !== undefined &&
-                    robot.practice_ended && <PracticeEnded runner={runner} />
+                    robot.practice_ended &&
+                    (at === null || (at.state.link === "live" && !at.site.isUnlisted)) && (
+                      <PracticeEnded runner={at?.site.url ?? runner} />
+                    )
                   }
                 />
               ))}
