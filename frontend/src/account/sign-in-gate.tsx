@@ -170,8 +170,8 @@ function useStopOf(gate: Gate): void {
     let gone = false;
     const onFound = (person: Person) => {
       if (gone) return;
-      rememberPerson(person);
       pageLink.enter(identityOf(person), 0);
+      rememberPerson(person);
     };
     currentPerson().then(onFound, () => {}); // without a session there is nobody to keep it for
     return () => {

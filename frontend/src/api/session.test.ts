@@ -76,3 +76,17 @@ test("who was here last may see what the device keeps, until they sign out", asy
     expect(rememberedPerson()).toBeNull();
   }
 });
+
+test("a device that stores nothing remembers nobody, and not the person before", () => {
+  const ada = { id: "a", name: "Ada", role: "viewer", personal: false } as const;
+  rememberPerson(ada);
+  vi.stubGlobal("localStorage", {
+    ...storage,
+    setItem: () => {
+      throw new DOMException("full", "QuotaExceededError");
+    },
+  });
+  rememberPerson({ ...ada, id: "b", name: "Ben" });
+  expect(rememberedPerson()).toBeNull();
+  vi.stubGlobal("localStorage", storage);
+});

@@ -69,8 +69,13 @@ export function identityOf({ id, role, name }: Person): string {
 
 /** Stores who is signed in, for a page that opens without a server; null: nobody is shown anything then. */
 export function rememberPerson(person: Person | null): void {
-  if (person === null) localStorage.removeItem(PERSON_KEY);
-  else localStorage.setItem(PERSON_KEY, JSON.stringify(person));
+  localStorage.removeItem(PERSON_KEY);
+  if (person === null) return;
+  try {
+    localStorage.setItem(PERSON_KEY, JSON.stringify(person));
+  } catch {
+    // A device that stores nothing still knows them until the page is loaded anew.
+  }
 }
 
 /** Role that an invitation gives, and who made it. */
