@@ -31,8 +31,8 @@ test("a graph is hidden from a person, then shown to look at, by the keyboard", 
   await owner.page.goto(product.url);
   const more = owner.page.getByRole("button", { name: /^More about .*Secret errand/ });
   await more.press("Enter");
-  await owner.page.getByRole("menuitem", { name: "Who may see it …" }).press("Enter");
-  const dialog = owner.page.getByRole("dialog", { name: /^Who may see .*Secret errand/ });
+  await owner.page.getByRole("menuitem", { name: "Who may see and edit it …" }).press("Enter");
+  const dialog = owner.page.getByRole("dialog", { name: /^Who may see and edit .*Secret errand/ });
   await expect(dialog.getByText("Everybody may see and edit it.")).toBeVisible();
   const seeing = dialog.getByRole("radiogroup", { name: "Who may see it" });
   await seeing.getByRole("radio", { name: "Everybody" }).press("ArrowRight");
@@ -53,7 +53,7 @@ test("a graph is hidden from a person, then shown to look at, by the keyboard", 
   // Then Mari may look at it.
   await expect(owner.page.getByText("Not everybody may see or edit this").first()).toBeAttached();
   await more.press("Enter");
-  await owner.page.getByRole("menuitem", { name: "Who may see it …" }).press("Enter");
+  await owner.page.getByRole("menuitem", { name: "Who may see and edit it …" }).press("Enter");
   const readers = dialog.getByRole("combobox", { name: "Who may see it: persons and groups" });
   await readers.fill("Mari");
   await readers.press("ArrowDown");

@@ -48,7 +48,7 @@ export function FolderMenu({ folder, folders, here = false, button }: Props) {
           </Menu.Item>
           {mayShare && (
             <Menu.Item leftSection={<IconLock size={15} />} onClick={() => ask("rule")}>
-              Who may see its graphs …
+              Who may see and edit its graphs …
             </Menu.Item>
           )}
           <Menu.Item leftSection={<IconFolderMinus size={15} />} onClick={() => ask("remove")}>

@@ -147,7 +147,7 @@ export function GraphMenu({ graph, button }: { graph: GraphSummary; button: Reac
           </Menu.Item>
           {mayShare && (
             <Menu.Item leftSection={<IconLock size={15} />} onClick={() => setRuling(true)}>
-              Who may see it …
+              Who may see and edit it …
             </Menu.Item>
           )}
           <Menu.Item

@@ -211,8 +211,8 @@ function Loaded(props: Omit<Props, "name">) {
 export function RuleDialog({ opened, name, ...props }: Props & { opened: boolean }) {
   const title =
     props.ruled.kind === "graph"
-      ? `Who may see ${isolated(name)}`
-      : `Who may see the graphs in ${isolated(name)}`;
+      ? `Who may see and edit ${isolated(name)}`
+      : `Who may see and edit the graphs in ${isolated(name)}`;
   return (
     <Modal
       opened={opened}
