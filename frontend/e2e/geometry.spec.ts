@@ -3,7 +3,7 @@
 import { readdirSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { saved, tidy, umrfOf } from "./canvas";
+import { atRest, saved, tidy, umrfOf } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();
@@ -214,6 +214,39 @@ test("tidied graphs have lines beside their cards, pills on nothing, and text th
     }
   }
   expect(lines).toBeGreaterThan(100);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("no card lies under the map as a graph opens, and the map comes as the view is moved", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Mari", { panels: "folded" });
+  const map = page.getByRole("img", { name: "Map of the canvas", includeHidden: true });
+  for (const count of [60, 300]) {
+    await page.goto(`${product.url}/graphs/${await task(count)}`);
+    await saved(page);
+    await expect(map).toBeAttached();
+    await atRest(page);
+    const under = () =>
+      map.evaluate((element) => {
+        const { left, top, right, bottom } = element.getBoundingClientRect();
+        const isUnder = (node: Element) => {
+          const box = node.getBoundingClientRect();
+          return box.left < right && box.right > left && box.top < bottom && box.bottom > top;
+        };
+        const nodes = [...document.querySelectorAll(".react-flow__node-action")];
+        return {
+          shown: element.checkVisibility({ visibilityProperty: true }),
+          cards: nodes.filter(isUnder).length,
+        };
+      });
+    const { shown, cards } = await under();
+    expect({ count, covered: shown ? cards : 0 }).toEqual({ count, covered: 0 });
+    await page.mouse.move(700, 450);
+    await page.mouse.wheel(0, -240);
+    await expect(map).toBeVisible();
+  }
   expect(failures).toEqual([]);
   await context.close();
 });

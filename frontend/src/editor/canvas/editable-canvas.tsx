@@ -11,7 +11,7 @@ import {
   SelectionMode,
   useStoreApi,
 } from "@xyflow/react";
-import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
+import { type MouseEvent, type RefObject, useEffect, useMemo, useRef, useState } from "react";
 import { actionDrag } from "../../canvas/action-drag";
 import { LineContext, LineEditingContext } from "../../canvas/arrows/line-store";
 import type { PlaceMap } from "../../canvas/editor-store";
@@ -158,6 +158,7 @@ function useNoteEditing(
 function useHandlers(
   { context, canvas, onPanned }: Pick<Props, "context" | "canvas" | "onPanned">,
   connecting: ReturnType<typeof useConnecting>,
+  onMoved: () => void,
 ) {
   return {
     onNodeDrag: useStableCallback(canvas.onDrag),
@@ -194,6 +195,9 @@ function useHandlers(
     // A move without an event was made by the page.
     onMoveStart: useStableCallback((event: Event | null) => {
       if (event !== null) onPanned();
+    }),
+    onMove: useStableCallback((event: Event | null) => {
+      if (event !== null) onMoved();
     }),
   };
 }
@@ -240,8 +244,10 @@ function Drawing({
   me,
   map,
   handlers,
+  moved,
 }: Pick<Props, "context" | "canvas" | "me" | "map"> & {
   handlers: ReturnType<typeof useHandlers>;
+  moved: boolean;
 }) {
   // On touch screens one finger either moves the view or draws a marquee.
   const coarse = useMediaQuery("(pointer: coarse)") ?? false;
@@ -295,7 +301,7 @@ function Drawing({
       )}
       {map && (
         <AfterFirstView>
-          <GraphMap nodes={canvas.nodes} flow={canvas.flow} />
+          <GraphMap nodes={canvas.nodes} flow={canvas.flow} moved={moved} />
         </AfterFirstView>
       )}
     </ReactFlow>
@@ -313,9 +319,15 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
     context.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
   };
   const connecting = useConnecting(context, openAddAt);
-  const handlers = useHandlers({ context, canvas, onPanned }, connecting);
+  const [moved, setMoved] = useState(false);
+  const onMoved = useStableCallback(() => setMoved(true));
+  const handlers = useHandlers({ context, canvas, onPanned }, connecting, onMoved);
   const press = useContextMenu(context);
-  const pinch = usePinch(context, onPanned);
+  const onPinched = useStableCallback(() => {
+    onMoved();
+    onPanned();
+  });
+  const pinch = usePinch(context, onPinched);
   const noteEditing = useNoteEditing(context, writing, canvas.setResized, canvas.view.toDocument);
   const lineEditing = useLineEditing(context, canvas.view.toDocument);
   const onDoubleClick = (event: MouseEvent) => {
@@ -374,7 +386,14 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
       <LineContext value={canvas.lines}>
         <NoteEditingContext value={noteEditing}>
           <LineEditingContext value={lineEditing}>
-            <Drawing context={context} canvas={canvas} me={me} map={map} handlers={handlers} />
+            <Drawing
+              context={context}
+              canvas={canvas}
+              me={me}
+              map={map}
+              handlers={handlers}
+              moved={moved}
+            />
           </LineEditingContext>
         </NoteEditingContext>
       </LineContext>

@@ -123,6 +123,20 @@ export function needsMap(area: MapArea, seen: MapArea): boolean {
   return isLarge && !isWithin;
 }
 
+/** px on screen from the corner of the canvas to the far sides of the map, beside the button of the details. */
+const CORNER = { width: MAP_SIZE.width + 68, height: MAP_SIZE.height + 18 };
+
+/** Return whether the map would lie over a card. */
+export function coversCard(nodes: readonly CanvasNode[], seen: MapArea, zoom: number): boolean {
+  const from = seen.x + seen.width - CORNER.width / zoom;
+  const down = seen.y + CORNER.height / zoom;
+  return nodes.some((node) => {
+    if (node.type === "note") return false;
+    const { x, y, width, height } = areaOf(node);
+    return x + width > from && x < seen.x + seen.width && y + height > seen.y && y < down;
+  });
+}
+
 interface MapFrame extends MapArea {
   /** Length in px of the graph that one px of the map stands for. */
   readonly scale: number;
@@ -200,9 +214,11 @@ const outline = ({ x, y, width, height }: MapArea) => `M${x},${y}h${width}v${hei
 interface Props {
   nodes: readonly CanvasNode[];
   flow: ReactFlowInstance<CanvasNode, Arrow>;
+  /** True once the person has moved the view: the map may lie over cards then. */
+  moved: boolean;
 }
 
-export function GraphMap({ nodes, flow }: Props) {
+export function GraphMap({ nodes, flow, moved }: Props) {
   const map = useRef<SVGSVGElement>(null);
   // Each update computes and paints all paths again.
   const throttled = useThrottledValue(nodes, REST);
@@ -223,7 +239,9 @@ export function GraphMap({ nodes, flow }: Props) {
   const frame = mapFrame(area, seen);
   useWheelZoom(map, flow);
   const hands = useDragging(flow, frame.scale);
-  const visibility = area === null || !needsMap(area, seen) ? "hidden" : undefined;
+  const isShown =
+    area !== null && needsMap(area, seen) && (moved || !coversCard(throttled, seen, zoom));
+  const visibility = isShown ? undefined : "hidden";
   return (
     <Panel position="top-right" className="react-flow__minimap" style={{ ...MAP_SIZE, visibility }}>
       <svg
