@@ -153,5 +153,18 @@ test("beside the open list a moment of the past is looked at whole, and restored
   await expect(bar(page)).toHaveCount(0);
   await expect(card(page, "Drive")).toContainText("0.4");
   await expect(card(ada.page, "Nod")).toHaveCount(0);
+
+  // It is undone by its person as any edit, and by nobody else.
+  await add(ada.page, "Bow");
+  await expect(card(page, "Bow")).toBeVisible();
+  await page.keyboard.press("ControlOrMeta+z");
+  for (const each of [page, ada.page]) {
+    await expect(card(each, "Nod")).toBeVisible();
+    await expect(card(each, "Drive")).toContainText("0.9");
+    await expect(card(each, "Bow")).toBeVisible();
+  }
+  await page.keyboard.press("ControlOrMeta+Shift+z");
+  for (const each of [page, ada.page]) await expect(card(each, "Nod")).toHaveCount(0);
+  await expect(card(page, "Bow")).toBeVisible();
   expect(eve.failures).toEqual([]);
 });

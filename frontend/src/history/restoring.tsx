@@ -10,6 +10,7 @@ import { authorName, copyMoment, refreshGraphs, type Version } from "../api/grap
 import { type HistoryEntry, refreshHistory, restoreMoment, revertEdits } from "../api/history";
 import { errorText } from "../api/http";
 import { pageUrl } from "../api/page-url";
+import { usePerson } from "../api/people";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { withPast } from "../edit-actions/graph-links";
 import { endsOf } from "../graph/document-keys";
@@ -17,9 +18,10 @@ import { copyNameOf } from "../graph/edit/clip";
 import { notesOf } from "../graph/edit/notes";
 import type { Graph } from "../graph/model";
 import { endName } from "../graph/relation-words";
-import { useThrottledLink } from "../sync/use-room";
+import { useRoom, useThrottledLink } from "../sync/use-room";
 import { copyText } from "../ui/copy-text";
 import { isolated } from "../words/isolated";
+import { adoptEdit } from "./adopt-edit";
 import style from "./restoring.module.css";
 
 export function PastWays({ versions }: { versions: readonly Version[] }) {
@@ -81,12 +83,22 @@ export function leftWords(graph: Graph, left: readonly string[]): string {
 
 export function useGoingBack(context: EditorContext) {
   const client = useQueryClient();
+  const { person } = usePerson();
+  const opened = useRoom();
   const [busy, setBusy] = useState(false);
   const { id, graph, lookAt } = context;
-  const go = async (refused: string, edit: () => Promise<void>) => {
+  const go = async (refused: string, edit: () => Promise<void>, kind: HistoryEntry["kind"]) => {
     setBusy(true);
+    const { seq } = opened.room.link();
     try {
       await edit();
+      await adoptEdit(opened, id, { kind, author: person.id, after: seq }).catch((error: unknown) =>
+        notifications.show({
+          color: "red",
+          title: "Done, but Undo cannot take it back. The history can.",
+          message: errorText(error),
+        }),
+      );
       lookAt(null);
     } catch (error) {
       notifications.show({ color: "red", title: refused, message: errorText(error) });
@@ -96,16 +108,24 @@ export function useGoingBack(context: EditorContext) {
     }
   };
   const revert = ({ author, from_seq = 0, seq }: HistoryEntry) =>
-    go("Not undone", async () => {
-      const { left } = await revertEdits(id, { author: author.id, from_seq, seq });
-      const message = leftWords(graph, left) || "Nobody had changed it since.";
-      const title = `What ${isolated(authorName(author))} did is undone`;
-      notifications.show({ title, message, autoClose: left.length > 0 ? 12_000 : 5_000 });
-    });
+    go(
+      "Not undone",
+      async () => {
+        const { left } = await revertEdits(id, { author: author.id, from_seq, seq });
+        const message = leftWords(graph, left) || "Nobody had changed it since.";
+        const title = `What ${isolated(authorName(author))} did is undone`;
+        notifications.show({ title, message, autoClose: left.length > 0 ? 12_000 : 5_000 });
+      },
+      "reverted",
+    );
   const restore = (seq: number, of?: string) =>
-    go("Not restored", async () => {
-      await restoreMoment(id, seq, of);
-    });
+    go(
+      "Not restored",
+      async () => {
+        await restoreMoment(id, seq, of);
+      },
+      "restored",
+    );
   return { busy, revert, restore };
 }
 

@@ -139,6 +139,18 @@ class Connection implements Room, SocketHandler {
     });
   }
 
+  shows(seq: number): Promise<void> {
+    return new Promise((resolve) => {
+      const look = () => {
+        if (this.current.state === "live" && this.current.seq < seq) return;
+        stop();
+        resolve();
+      };
+      const stop = this.onLink(look);
+      look();
+    });
+  }
+
   reconnect(): void {
     if (this.closed) return;
     this.say({ state: "connecting", why: undefined });

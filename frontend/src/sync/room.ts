@@ -51,6 +51,8 @@ export interface Room {
   onLink(listener: () => void): () => void;
   /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
   settled(signal?: AbortSignal): Promise<number>;
+  /** Resolves once the page shows the log up to `seq`, or is not connected. */
+  shows(seq: number): Promise<void>;
   /** Connects at once, also after a refusal (when the person has signed in again, for example). */
   reconnect(): void;
   /**

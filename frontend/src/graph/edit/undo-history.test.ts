@@ -431,3 +431,57 @@ test.each([1, 2, 3])(
     );
   },
 );
+
+// -- edits that the server makes for the person -------------------------------------------------
+
+/** The server sets a document of another one's edits back, as a restore does, and the page adopts that. */
+function restored(doc: Y.Doc, undo: ReturnType<typeof undoOf>, edit: (server: Y.Doc) => void) {
+  const server = copyOf(doc);
+  server.clientID = 3_000;
+  const before = mapsOf(copyOf(server));
+  edit(server);
+  const after = mapsOf(copyOf(server));
+  Y.applyUpdate(doc, Y.encodeStateAsUpdate(server), "remote");
+  return () => undo.adopt(before, after);
+}
+
+test("a restore is undone and redone as the person's own edit, and the edit before it, too", () => {
+  const [doc, a] = docWith("A") as [Y.Doc, Key];
+  const undo = undoOf(doc);
+  setField(doc, a, "actor", "first");
+  setField(doc, a, "actor", "second");
+  restored(doc, undo, (server) => {
+    setField(server, a, "actor", "first");
+    addAction(server, { name: "B" });
+  })();
+  undo.undo();
+  expect(actionIn(doc, a)?.actor).toBe("second");
+  expect(names(doc)).toHaveLength(1);
+  undo.redo();
+  expect(actionIn(doc, a)?.actor).toBe("first");
+  expect(names(doc)).toHaveLength(2);
+  undo.undo();
+  undo.undo();
+  expect(actionIn(doc, a)?.actor).toBe("first");
+});
+
+test("undoing a restore keeps what others have set since, also before it was known as a restore", () => {
+  const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
+  const undo = undoOf(doc);
+  const theirs = (of: Key, actor: string) => {
+    const other = copyOf(doc);
+    setField(other, of, "actor", actor);
+    Y.applyUpdate(doc, Y.encodeStateAsUpdate(other), "remote");
+  };
+  const adopt = restored(doc, undo, (server) => {
+    for (const key of [a, b]) setField(server, key, "actor", "restored");
+    setField(server, a, "description", "restored");
+  });
+  theirs(a, "theirs");
+  adopt();
+  theirs(b, "theirs");
+  undo.undo();
+  for (const key of [a, b]) expect(actionIn(doc, key)?.actor).toBe("theirs");
+  expect(actionIn(doc, a)?.description).toBe("");
+  expect(undo.canUndo()).toBe(false);
+});

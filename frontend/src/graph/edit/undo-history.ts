@@ -15,7 +15,7 @@
 
 import { ObservableV2 } from "lib0/observable";
 import * as Y from "yjs";
-import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../document-keys";
+import { endsOf, type Maps, ROOTS, type Root, rootOf, splitKey } from "../document-keys";
 import { isEqual } from "../values";
 
 /** The content of a key for a while. Two of them are the same object only if the key was not set in between. */
@@ -46,6 +46,8 @@ interface StepEvent {
 }
 
 const placeOf = (root: Root, key: string) => `${root} ${key}`;
+const heldIn = (map: Pick<ReadonlyMap<string, unknown>, "get" | "has">, key: string) =>
+  map.has(key) ? { value: map.get(key) } : null;
 const isGone = ({ held }: KeyState) => held === null;
 
 export class UndoHistory extends ObservableV2<{
@@ -61,6 +63,8 @@ export class UndoHistory extends ObservableV2<{
   private readonly own: unknown;
   /** The present states of the keys of all steps. */
   private readonly states = new Map<string, KeyState>();
+  /** The states before the newest changes that others, or the server, made of these keys. */
+  private readonly earlier = new Map<string, KeyState>();
   private made: UndoStep | null = null;
   private lastChange = 0;
   private readonly observers: readonly (readonly [Root, (event: Y.YMapEvent<unknown>) => void])[];
@@ -91,6 +95,33 @@ export class UndoHistory extends ObservableV2<{
   /** Makes the step again that was undone last. */
   redo(): UndoStep | null {
     return this.takeBack(this.redoStack, this.undoStack, "redo");
+  }
+
+  /**
+   * Records as a step an edit that the server made for the person, such as a restore. `before` and `after`: the
+   * document around that edit. A key that is not as the edit left it is no part of the step.
+   */
+  adopt(before: Maps, after: Maps): void {
+    const step = new UndoStep();
+    for (const root of ROOTS) {
+      for (const key of new Set([...before[root].keys(), ...after[root].keys()])) {
+        const [found, made] = [heldIn(before[root], key), heldIn(after[root], key)];
+        const now = this.stateNow(root, key);
+        if (isEqual(found, made) || !isEqual(now.held, made)) continue;
+        const place = placeOf(root, key);
+        const left = this.states.get(place) ?? now;
+        const earlier = this.earlier.get(place);
+        // The state of the step before, so that it can be undone, too.
+        const back = earlier && isEqual(earlier.held, found) ? earlier : { held: found };
+        this.states.set(place, left);
+        step.keys.set(place, { root, key, back, left });
+      }
+    }
+    if (step.keys.size === 0) return;
+    this.redoStack.length = 0;
+    this.lastChange = 0;
+    this.undoStack.push(step);
+    this.emit("stack-item-added", [{ stackItem: step, type: "undo" }]);
   }
 
   override destroy(): void {
@@ -133,6 +164,8 @@ export class UndoHistory extends ObservableV2<{
   private heed(root: Root, key: string, event: Y.YMapEvent<unknown>): void {
     const place = placeOf(root, key);
     if (event.changes.keys.has(key)) {
+      const state = this.states.get(place);
+      if (state !== undefined) this.earlier.set(place, state);
       this.states.set(place, this.stateNow(root, key));
       return;
     }
@@ -148,8 +181,7 @@ export class UndoHistory extends ObservableV2<{
   }
 
   private stateNow(root: Root, key: string): KeyState {
-    const map = rootOf(this.doc, root);
-    return { held: map.has(key) ? { value: map.get(key) } : null };
+    return { held: heldIn(rootOf(this.doc, root), key) };
   }
 
   private readonly onTransaction = (): void => {
