@@ -129,6 +129,47 @@ test("a graph opens with its outline, which says how its run goes; the device ke
   await context.close();
 });
 
+test("a breakpoint is set in the outline; the run waits there, and goes on by a finger", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada", {
+    ...{ ...PHONE, panels: "folded" },
+  });
+  await page.goto(`${product.url}/graphs/${await product.chain(3)}`);
+  await saved(page);
+  await page.getByRole("button", { name: "What to do with Wait 1", exact: true }).tap();
+  const last = page.getByRole("menuitem", { name: "Delete" });
+  await expect(last).toBeVisible();
+  const stop = page.getByRole("button", { name: /^Stop / });
+  const [end, bar] = [await boxOf(last), await boxOf(stop)];
+  expect(end.y + end.height).toBeLessThanOrEqual(bar.y);
+  await page.getByRole("menuitem", { name: "Set a breakpoint" }).tap();
+  const row = page.getByRole("row", { name: /^Wait 1/ });
+  await expect(row.getByTitle("A led run waits before this")).toBeVisible();
+  await saved(page);
+
+  await page.getByRole("button", { name: "Run v1 in the simulator …" }).tap();
+  const start = page
+    .getByRole("dialog")
+    .getByRole("button", { name: /^Run v\d+, step by step, in/ });
+  await expect(start).toBeEnabled();
+  await start.scrollIntoViewIfNeeded();
+  await press(page, start);
+  const waits = page
+    .getByRole("region", { name: "The run waits for a person" })
+    .filter({ visible: true });
+  await expect(waits).toContainText("Breakpoint before Wait 1");
+  await expect(stop).toBeInViewport({ ratio: 1 });
+  await press(page, waits.getByRole("button").filter({ hasText: "Go on" }));
+  await expect(row).toContainText("true");
+  await expect(waits).toBeHidden();
+
+  await menu(page, "Wait 1", /Remove the breakpoint/);
+  await expect(row.getByTitle("A led run waits before this")).toBeHidden();
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
 test("a phone draws a graph without places top-down, and alters it for nobody until a card is moved", async ({
   browser,
 }) => {

@@ -18,11 +18,13 @@ import {
 } from "react";
 import { checkedColor } from "../api/people";
 import { useEditorStore, useOpenThreadCount } from "../canvas/editor-store";
+import { BreakpointMark } from "../canvas/marks/breakpoint-mark";
 import { noteColor } from "../canvas/notes/note-nodes";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import { breakpointWords, readBreakpoint } from "../graph/breakpoints";
 import type { Note } from "../graph/edit/notes";
 import { cardLines, lineText } from "../graph/field-words";
-import type { Relation } from "../graph/model";
+import type { Action, Relation } from "../graph/model";
 import { spokenNote } from "../graph/note-links";
 import { shownName } from "../graph/questions";
 import { handOverLabel, handOverOf, type RobotOf, robotWord } from "../graph/robots";
@@ -61,6 +63,13 @@ export interface RowHandlers {
   choose(row: OutlineItem): void;
   run(rowAction: RowAction, row: OutlineItem): void;
   done(said: string | null): void;
+}
+
+/** Shows that a led run waits at this action. */
+export function WaitMark({ action }: { action: Action }) {
+  const own = action.missing ? null : readBreakpoint(action.breakpoint);
+  if (own === null) return null;
+  return <BreakpointMark of={action.key} on="row" words={breakpointWords(own, "action")} />;
 }
 
 export function Talk({ of }: { of: string }) {
@@ -144,6 +153,7 @@ export function Words({ row, progress, name, robots }: WordsProps) {
             <b>
               {shownName(action.name)} {action.instanceId}
             </b>
+            <WaitMark action={action} />
             <Talk of={action.key} />
             {progress && (
               <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
@@ -219,7 +229,13 @@ export function RowActions(props: RowActionsProps) {
   );
   if (opened === null) return button;
   return (
-    <Menu opened={opened} onChange={setOpened} trapFocus returnFocus={false}>
+    <Menu
+      opened={opened}
+      onChange={setOpened}
+      trapFocus
+      returnFocus={false}
+      middlewares={ABOVE_STOP}
+    >
       <Menu.Target>{button}</Menu.Target>
       <Menu.Dropdown>
         {rowActionsOf(row, store).map((rowAction) => (
@@ -236,6 +252,9 @@ export function RowActions(props: RowActionsProps) {
     </Menu>
   );
 }
+
+/** A menu moves up where STOP would cover its end on a phone. */
+const ABOVE_STOP = { flip: true, shift: { crossAxis: true, padding: { bottom: 84 } } };
 
 const keyWords = (key: string): string =>
   key.replace("Arrow", "").replace("Alt+Up", "Alt ↑").replace("Alt+Down", "Alt ↓").toUpperCase();

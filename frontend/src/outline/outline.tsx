@@ -23,7 +23,14 @@ import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
 import { PhoneRow } from "./phone-row";
 import { RobotFilter } from "./robot-filter";
-import { moveRow, type RowAction, type RowEditKind, removeRow, rowActionFor } from "./row-actions";
+import {
+  moveRow,
+  type RowAction,
+  type RowEditKind,
+  removeRow,
+  rowActionFor,
+  toggleBreakpoint,
+} from "./row-actions";
 import { type BundleRow, bundlesOf, namesOf, type OutlineItem, rowsOf, subjectOf } from "./rows";
 
 const MANY = 40; // actions; above that the rows begin closed
@@ -149,6 +156,9 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
         break;
       case "expand":
         store.graphsInside.now()?.expand.toggle(subjectOf(row));
+        break;
+      case "breakpoint":
+        announcer.say(toggleBreakpoint(context, row));
         break;
       case "delete":
         announcer.say(removeRow(context, row));

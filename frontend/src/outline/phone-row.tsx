@@ -18,6 +18,7 @@ import {
   type RowHandlers,
   rowAttributes,
   Talk,
+  WaitMark,
   Words,
 } from "./outline-row";
 import style from "./phone-row.module.css";
@@ -93,6 +94,7 @@ function About(props: Pick<Props, "row" | "progress" | "robots"> & { name: strin
     <>
       <span className="row min-w-0 gap-50">
         <bdi className={style.name}>{name}</bdi>
+        <WaitMark action={action} />
         <Talk of={action.key} />
         {progress && (
           <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />

@@ -2,6 +2,7 @@
 
 import type { EditorStore } from "../canvas/editor-store";
 import type { EditorContext } from "../edit-actions/editor-context";
+import { PLAIN, readBreakpoint } from "../graph/breakpoints";
 import { relationId } from "../graph/document-keys";
 import {
   asOneEdit,
@@ -11,6 +12,7 @@ import {
   setResponse,
   swapOrder,
 } from "../graph/edit";
+import { setBreakpoint } from "../graph/edit/breakpoints";
 import { type Action, ENTRY, type Key, type Precondition, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { type KeyPress, keyOf } from "../ui/keys";
@@ -28,6 +30,7 @@ export interface RowAction {
     | "down"
     | "details"
     | "comments"
+    | "breakpoint"
     | "enter"
     | "expand";
   readonly label: string;
@@ -40,6 +43,12 @@ const RENAME: RowAction = { name: "rename", label: "Rename", key: "F2", changes:
 const CONNECT: RowAction = { name: "connect", label: "Connect …", key: "c", changes: true };
 const DETAILS: RowAction = { name: "details", label: "Details", key: "Enter", changes: false };
 const TALK: RowAction = { name: "comments", label: "Comment", key: "m", changes: false };
+const WAIT: RowAction = {
+  name: "breakpoint",
+  label: "Set a breakpoint",
+  key: "F9",
+  changes: true,
+};
 const UP: RowAction = { name: "up", label: "Move up", key: "Alt+ArrowUp", changes: true };
 const DOWN: RowAction = { name: "down", label: "Move down", key: "Alt+ArrowDown", changes: true };
 const DELETE: RowAction = { name: "delete", label: "Delete", key: "Delete", changes: true };
@@ -73,8 +82,13 @@ export function rowActionsOf(row: OutlineItem, store: EditorStore): readonly Row
   switch (row.kind) {
     case "entry":
       return [{ ...CONNECT, label: "Start with …" }];
-    case "action":
-      return [DETAILS, ...levelActions(row.action, store), RENAME, CONNECT, TALK, UP, DOWN, DELETE];
+    case "action": {
+      const { breakpoint, missing } = row.action;
+      const label = readBreakpoint(breakpoint) === null ? WAIT.label : "Remove the breakpoint";
+      const wait = missing ? [] : [{ ...WAIT, label }];
+      const inside = levelActions(row.action, store);
+      return [DETAILS, ...inside, RENAME, CONNECT, ...wait, TALK, UP, DOWN, DELETE];
+    }
     case "inside":
       return [
         { ...ENTER, label: "Open its level", key: "Enter" },
@@ -127,6 +141,16 @@ export function removeRow(context: EditorContext, row: OutlineItem): string {
     });
   } else removeRelation(context.doc, id);
   return `The arrow to ${isolated(endName(context.graph, row.relation.child))} is deleted`;
+}
+
+/** Sets a breakpoint at the action of a row, or removes the one that it has. */
+export function toggleBreakpoint(context: EditorContext, row: OutlineItem): string {
+  if (row.kind !== "action") return "";
+  const { key, breakpoint } = row.action;
+  const sets = readBreakpoint(breakpoint) === null;
+  setBreakpoint(context.doc, key, sets ? PLAIN : null);
+  const name = isolated(endName(context.graph, key));
+  return sets ? `A led run waits before ${name}` : `No led run waits at ${name} any more`;
 }
 
 /** The relation through which a row stands where it stands. */

@@ -1,10 +1,10 @@
-/** The mark of a breakpoint, on a card or an arrow: a disc, with a dot in it where it has conditions. */
+/** The mark of a breakpoint, on a card, an arrow or a row of the outline: a disc, with a dot in it where it has conditions. */
 import style from "./breakpoint-mark.module.css";
 
 interface BreakpointMarkProps {
   /** The action or relation that has it. */
   of: string;
-  on: "card" | "arrow";
+  on: "card" | "arrow" | "row";
   /** Text that says what it does. */
   words: string;
 }
