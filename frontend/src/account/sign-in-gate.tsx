@@ -162,7 +162,7 @@ function useStopOf(gate: Gate): void {
     if (gate.at === "knocking") return;
     const person = gate.at === "inside" ? gate.person : rememberedPerson();
     if (person === null) pageLink.leave();
-    else pageLink.enter(identityOf(person), visitOf(gate));
+    else pageLink.enter(identityOf(person), visitOf(gate), person);
   }, [gate]);
   const { at } = gate;
   useEffect(() => {
@@ -170,7 +170,7 @@ function useStopOf(gate: Gate): void {
     let gone = false;
     const onFound = (person: Person) => {
       if (gone) return;
-      pageLink.enter(identityOf(person), 0);
+      pageLink.enter(identityOf(person), 0, person);
       rememberPerson(person);
     };
     currentPerson().then(onFound, () => {}); // without a session there is nobody to keep it for

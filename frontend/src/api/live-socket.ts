@@ -35,6 +35,8 @@ export interface StopRequest {
   detail: string;
   /** Set if it is refused since this runner has no such run. */
   isAbsent?: true;
+  /** The name of who asked for it, set if it is refused since somebody else signed in before it was heard. */
+  of?: string;
   /** The tick at which the runner had it. */
   heardAt?: number;
   /**
@@ -182,11 +184,19 @@ export class LiveSocket {
             isAbsent: error instanceof Refusal && error.details.status === 404,
           }),
       );
-      const now = this.state.stops.find((stop) => stop.id === id);
-      if (this.#closed || now?.state !== "unheard") return;
+      const isDue = () =>
+        !this.#closed &&
+        this.state.stops.some((stop) => stop.id === id && stop.state === "unheard");
+      if (!isDue()) return;
       await new Promise((done) => setTimeout(done, AGAIN));
-      if (this.#closed) return; // another runner may have this address now
+      if (!isDue()) return; // another runner may have this address now
     }
+  }
+
+  /** Sends a STOP ALL no more that nobody has answered: it is of somebody who is not signed in any more. */
+  disown(of: string): void {
+    const stops = this.state.stops.map((stop) => disowned(stop, of));
+    this.#set({ stops });
   }
 
   async #sendStop(run: string, id: string, again: boolean): Promise<Stopping> {
@@ -465,7 +475,7 @@ export class LiveSocket {
     const awaits = answer && namesMore(answer, this.state) ? ("robots" as const) : more.awaits;
     const named = answer?.runs.map((run) => run.replace(PIECE, "")) ?? [];
     const stops = this.state.stops.map((stop) => {
-      if (stop.id !== id || stop.state === "heard") return stop;
+      if (stop.id !== id || stop.state === "heard" || (stop.of && !heard)) return stop;
       // What began until it was heard is stopped by it as well.
       const late = heard && stop.run === "all" && tick() - stop.at > AGAIN;
       const began = late ? openRuns(this.state).map((run) => run.id) : [];
@@ -554,6 +564,10 @@ function namesMore({ graphs, unknown }: Stopping, now: LiveState): boolean {
     Object.keys(graphs ?? {}).some((name) => !moving.has(name)) ||
     Object.keys(unknown ?? {}).some((name) => !silent.has(name))
   );
+}
+
+export function disowned(stop: StopRequest, of: string): StopRequest {
+  return stop.run === "all" && isWaiting(stop) ? { ...stop, state: "refused", of } : stop;
 }
 
 /** Calls all listeners. One that fails keeps no other one, and nothing that comes after, from its turn. */

@@ -1,5 +1,7 @@
 /** How the page finds its runners, and hears of others while it is open. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { wholeNotice } from "../runs/stop/stop-notice";
+import { plain } from "../testing/texts";
 import { Wire } from "../testing/wire";
 
 /** That of a page of its own for each test: a STOP ALL that is not proven outlives its person. */
@@ -18,7 +20,7 @@ const C = { name: "Hall C", url: "http://h:3" };
 let runners: object[];
 let asked: number;
 let posted: string[];
-const page = Object.assign(new EventTarget(), { hidden: false });
+const page = Object.assign(new EventTarget(), { hidden: false, querySelector: () => null });
 
 beforeEach(async () => {
   vi.resetModules();
@@ -182,6 +184,71 @@ test("whoever signs in while a STOP ALL is not proven keeps it, and dials anew",
   hear();
   expect(pageLink.now().live?.state.stops).toMatchObject([{ state: "unheard" }]);
   expect(pageLink.now().signedIn).toBe(true);
+});
+
+const ADA = { id: "a", name: "Ada" };
+const BOB = { id: "b", name: "Bob" };
+const said = () => {
+  const now = pageLink.now().live?.state;
+  return now && plain(wholeNotice(now, new Set(), performance.now())?.text);
+};
+
+test("a STOP ALL that no runner has heard is not sent in the name of somebody else, and said not to be", async () => {
+  chunk.fails = false;
+  await pass(6_000);
+  pageLink.enter("ada viewer", 2, ADA);
+  hear();
+  const { heard, end } = silence();
+  pageLink.now().live?.stop("all");
+  await pass(100);
+  pageLink.leave();
+  await pass(100);
+  pageLink.enter("ada operator", 3, ADA);
+  expect(pageLink.now().live?.state.stops).toMatchObject([{ state: "unheard" }]); // the same person
+  pageLink.leave();
+  pageLink.enter("bob", 4, BOB);
+  await pass(10);
+  hear();
+  expect(said()).toMatch(
+    /NOT SENT at Hall B: STOP ALL of Ada, \d\d:\d\d:\d\d\. Press STOP again\./,
+  );
+  end();
+  runners = [A, B, C];
+  posted = [];
+  await pass(31_000);
+  hear();
+  expect(heard).toEqual([]);
+  expect(posted).toEqual([]); // nor to a runner of which the page hears now
+  pageLink.now().live?.stop("all");
+  await pass(100);
+  expect(heard).toHaveLength(1);
+  expect(said()).not.toContain("Ada");
+});
+
+test("a STOP ALL of somebody who has left before any runner was known is said not to be sent", async () => {
+  pageLink.leave();
+  vi.resetModules();
+  ({ pageLink } = await import("./page-link"));
+  const answered = fetch;
+  let isSilent = true;
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (isSilent) throw new TypeError("no answer");
+    return answered(url, init);
+  });
+  runners = [A];
+  pageLink.enter("ada", 1, ADA);
+  pageLink.now().live?.stop("all");
+  pageLink.leave();
+  await pass(8 * 3_600_000);
+  pageLink.enter("bob", 2, BOB);
+  expect(said()).toContain("NOT SENT: STOP ALL of Ada");
+  isSilent = false;
+  await pass(10_000);
+  hear();
+  expect(posted).toEqual([]);
+  expect(said()).toContain("NOT SENT: STOP ALL of Ada");
+  pageLink.leave();
+  expect(pageLink.now().signedIn).toBe(false); // nothing is sent on
 });
 
 test("whoever comes back has the sockets of all again", async () => {

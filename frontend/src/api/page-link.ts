@@ -29,6 +29,8 @@ class PageLink {
   readonly #listeners = new Set<() => void>();
   /** Identity of the open socket: the runner knows it by the session it was opened with. */
   #who = "";
+  /** Who signed in last: a STOP ALL that no runner has heard is theirs. */
+  #person = { id: "", name: "" };
   #visit = 0;
   #sites: readonly Site[] = [];
   /** Whether the sites are being fetched, and whether what is fetched is out of date already. */
@@ -48,14 +50,18 @@ class PageLink {
 
   /**
    * Says who is signed in. `visit` counts how often somebody signed in since the page was opened: a new
-   * name or visit dials anew, since the socket is known by the old one.
+   * name or visit dials anew, since the socket is known by the old one. Nothing that another person has asked for is
+   * sent in the name of this one.
    */
-  enter(who: string, visit: number): void {
+  enter(who: string, visit: number, person = { id: who, name: who }): void {
     this.#endWait();
+    const before = this.#person;
+    this.#person = person;
     const known = this.#state.signedIn && this.#who === who && visit <= this.#visit;
     this.#who = who;
     this.#visit = Math.max(visit, this.#visit);
     if (this.#state.live !== null) {
+      if (before.id !== person.id) this.#state.live.disown(before.name);
       if (!known) this.#state.live.redial();
       return;
     }

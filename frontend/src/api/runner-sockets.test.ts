@@ -124,6 +124,15 @@ test("a site that comes long after a Stop keeps what its people started", async 
   expect(posted.filter(({ url }) => url.startsWith(C.url))).toEqual([]);
 });
 
+test("a site that comes after the device has slept keeps what its people started", () => {
+  live.setSites([A, B]);
+  live.stop("all");
+  vi.setSystemTime(Date.now() + 9 * 3_600_000); // the clock of the page stood still meanwhile
+  posted = [];
+  live.setSites([A, B, C]);
+  expect(posted).toEqual([]);
+});
+
 test("a second site makes of one runner two, and its socket stays", () => {
   live.setSites([{ name: "", url: A.url }]);
   hello(A.url, run("a"));

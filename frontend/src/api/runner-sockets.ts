@@ -2,9 +2,10 @@
  * The live sockets of all runners of the page behind one. STOP has this, and reaches each of them by it; what
  * joins the states of several (`live-sites.ts`) is loaded with several only, and may never come.
  */
-import { tick } from "../clock/server-clock";
+import { deviceNow, tick } from "../clock/server-clock";
 import { newAid } from "../graph/stop-basics";
 import {
+  disowned,
   foreignGraphs,
   isUnproven,
   isWaiting,
@@ -22,6 +23,9 @@ export interface Part {
   readonly site: Site;
   readonly socket: LiveSocket;
 }
+
+/** `pressedAt`: by the device's own clock; that of `tick` may stand still while the device sleeps. */
+type Pressed = StopRequest & { readonly pressedAt: number };
 
 type Times = Pick<LiveSocket, "runSeenAt" | "robotAnsweredAt">;
 
@@ -45,6 +49,9 @@ export const NOTHING: LiveState = {
   runs: new Map(),
   stops: [],
 };
+
+const isRecent = ({ at, pressedAt }: Pressed) =>
+  Math.max(tick() - at, deviceNow() - pressedAt) < LATE;
 
 const unlisted = ({ listedAs, site, socket }: Part): Part => ({
   listedAs,
@@ -80,7 +87,7 @@ export class RunnerSockets implements Times {
   /** Reason why what goes on is not known, apart from the reasons of the sockets. */
   #lost = "";
   /** Each STOP ALL, for sites of which the page hears later. */
-  #pressed: readonly StopRequest[] = [];
+  #pressed: readonly Pressed[] = [];
   readonly #listeners = new Set<() => void>();
   readonly #seers = new Set<() => void>();
   readonly #onStop: () => void;
@@ -111,7 +118,7 @@ export class RunnerSockets implements Times {
     const isFirst = old.length === 0;
     for (const { listedAs, socket } of parts) {
       if (old.some((part) => part.socket === socket)) continue;
-      const late = this.#pressed.filter((stop) => isFirst || tick() - stop.at < LATE);
+      const late = this.#pressed.filter((stop) => isWaiting(stop) && (isFirst || isRecent(stop)));
       const moved = left.find((part) => part.listedAs === listedAs)?.socket.state.stops ?? [];
       const ids = new Map([...late, ...moved.filter(isWaiting)].map(({ id, run }) => [id, run]));
       tellEach(
@@ -121,6 +128,10 @@ export class RunnerSockets implements Times {
               socket.stop(run, id),
         ),
       );
+      if (isFirst) {
+        const stops = this.#pressed.filter((stop) => !isWaiting(stop));
+        tellEach([() => socket.takeOver({ ...NOTHING, stops })]);
+      }
       socket.subscribe(() => this.#hear());
       socket.subscribeSeen(() => this.#see());
       tellEach([() => socket.open()]);
@@ -156,8 +167,10 @@ export class RunnerSockets implements Times {
   get isStopping(): boolean {
     const last = this.#pressed.at(-1);
     const isDue = (stop: StopRequest) =>
-      isWaiting(stop) || isUnproven(stop) || (stop.state === "refused" && stop.id === last?.id);
-    if (this.#parts.length === 0) return last !== undefined;
+      isWaiting(stop) ||
+      isUnproven(stop) ||
+      (stop.state === "refused" && stop.of === undefined && stop.id === last?.id);
+    if (this.#parts.length === 0) return last !== undefined && last.of === undefined;
     return this.#parts.some(({ socket: { state } }) => state.stops.some(isDue));
   }
 
@@ -190,9 +203,17 @@ export class RunnerSockets implements Times {
     tellEach((having ?? this.#parts).map((part) => () => part.socket.stop(run, id)));
     if (run !== "all") return;
     const stop = { id, run, at: tick(), runs: [], state: "asked", detail: "" } as const;
-    this.#pressed = [...this.#pressed.slice(-4), stop];
+    const pressedAt = deviceNow();
+    this.#pressed = [...this.#pressed.slice(-4), { ...stop, pressedAt }];
     if (this.#parts.length === 0) this.#hear();
     this.#onStop();
+  }
+
+  /** Sends a STOP ALL no more that no runner has heard: its person, with this name, is not the one who is signed in. */
+  disown(of: string): void {
+    this.#pressed = this.#pressed.map((stop) => ({ ...stop, ...disowned(stop, of) }));
+    for (const { socket } of this.#parts) socket.disown(of);
+    this.#hear();
   }
 
   learn(run: Parameters<LiveSocket["learn"]>[0]): void {

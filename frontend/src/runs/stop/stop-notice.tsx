@@ -66,7 +66,11 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const waited = at - stop.at;
   const since = `asked ${duration(waited)} ago`;
   if (stop.state === "refused") {
-    return { tone: "loud", text: `Stop refused: ${isolated(stop.detail)} Use the hardware stop.` };
+    const told =
+      stop.of === undefined
+        ? `Stop refused: ${isolated(stop.detail)}`
+        : `NOT SENT: STOP ALL of ${isolated(stop.of)}, ${clock(serverTimeOf(stop.at))}. Press STOP again.`;
+    return { tone: "loud", text: `${told} Use the hardware stop.` };
   }
   const unsent = stop.state === "unheard" || (stop.state === "asked" && waited > HEARD);
   if (unsent) {
