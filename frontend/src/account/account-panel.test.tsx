@@ -79,7 +79,7 @@ test("who could not sign out before is told, too, that a STOP ALL is not proven"
   deleted = [];
   await signOut();
   expect(deleted).toEqual([]);
-  expect(said()).toContain("STOP ALL is not proven");
+  expect(said()).toContain("A Stop is not proven");
   await signOut();
   expect(deleted).toHaveLength(2);
 });

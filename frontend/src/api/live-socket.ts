@@ -566,6 +566,7 @@ function namesMore({ graphs, unknown }: Stopping, now: LiveState): boolean {
   );
 }
 
+/** Return a STOP ALL that nobody has answered as one that is not sent any more, since `of` is not signed in. */
 export function disowned(stop: StopRequest, of: string): StopRequest {
   return stop.run === "all" && isWaiting(stop) ? { ...stop, state: "refused", of } : stop;
 }
