@@ -149,8 +149,10 @@ export function toggleBreakpoint(context: EditorContext, row: OutlineItem): stri
   const { key, breakpoint } = row.action;
   const sets = readBreakpoint(breakpoint) === null;
   setBreakpoint(context.doc, key, sets ? PLAIN : null);
-  const name = isolated(endName(context.graph, key));
-  return sets ? `A led run waits before ${name}` : `No led run waits at ${name} any more`;
+  const name = endName(context.graph, key);
+  return sets
+    ? `A led run waits before ${isolated(name)}`
+    : `No led run waits at ${isolated(name)} any more`;
 }
 
 /** The relation through which a row stands where it stands. */
