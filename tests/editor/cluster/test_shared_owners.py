@@ -148,6 +148,8 @@ async def test_an_editor_whose_session_was_cut_takes_a_slot_again_and_goes_on(
     )
     name = database.rpartition("/")[2]
     cut = f"SELECT l.pid, pg_terminate_backend(l.pid){slots}0"
+    # As if another editor had held the slot last.
+    await asyncio.to_thread(postgres.sql, "UPDATE editor SET proof = '\\x00' WHERE slot = 0", name)
     pid = (await asyncio.to_thread(postgres.ask, cut, name)).split("|")[0]
     held = f"SELECT l.pid{slots}0"
     async with asyncio.timeout(20):
