@@ -19,8 +19,9 @@ from pycrdt import Doc, Map
 from action_assistant.editor.crdt import messages
 from action_assistant.web.network.connection_limits import AT_ONCE, OF_A_PERSON
 from editor import forged_updates
-from editor.api.test_sockets import acks, closed, eventually, goodbye, masked, upgraded
+from editor.api.test_sockets import acks, closed, goodbye, masked, upgraded
 from editor.process import BEARER, Editor, running
+from support.waiting import wait_until
 
 TOGETHER = 1000
 ROUNDS = max(1, int(os.environ.get("TEST_RECONNECTS", "1000")) // TOGETHER)
@@ -87,7 +88,7 @@ async def healthy(editor: Editor, graph: str) -> AsyncIterator[list[float]]:
         yield taken
         assert not task.done(), task
         before = len(taken)
-        await eventually(lambda: len(taken) > before)
+        await wait_until(lambda: len(taken) > before)
         task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await task
@@ -103,7 +104,7 @@ async def test_a_forger_is_closed_and_the_victims_edit_survives(editor: Editor, 
         victim.get("things", type=Map)["mine"] = "one"
         async with editor.socket(graph, **eve) as forger:
             await forger.send_bytes(messages.question(b"\x00"))
-            await eventually(lambda: True)
+            await wait_until(lambda: True)
             while not isinstance(
                 heard := messages.parse(await forger.receive_bytes(5)), messages.Edit
             ) or (b"mine" not in heard.update):
@@ -115,7 +116,7 @@ async def test_a_forger_is_closed_and_the_victims_edit_survives(editor: Editor, 
         victim.get("things", type=Map)["late"] = "mine"
         reader: Doc[Any] = Doc()
         async with editor.socket(graph, **token), editor.joined(graph, reader):
-            await eventually(
+            await wait_until(
                 lambda: reader.get("things", type=Map).to_py() == {"mine": "one", "late": "mine"}
             )
 
@@ -173,7 +174,7 @@ async def test_updates_that_kill_the_library_are_refused_while_others_edit(
                 last = len(taken)
                 if graph != calm:
                     refused_in[number % len(killers)].append(time.monotonic() - begun)
-                await eventually(lambda last=last: len(taken) > last)
+                await wait_until(lambda last=last: len(taken) > last)
                 held[number % len(killers), graph == calm].append(max(taken[first : last + 1]))
     assert max(map(min, held.values())) < sound
     slowest = max(refused_in, key=lambda killer: min(refused_in[killer]))

@@ -21,9 +21,9 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
-from editor.api.test_sockets import eventually
 from editor.dying_rooms import NOWHERE, POINTS, Pipe
 from editor.process import Editor, running
+from support.waiting import wait_until
 
 WRITERS: Final = 3
 KILLS: Final = 4
@@ -109,7 +109,7 @@ async def test_nothing_acknowledged_or_seen_is_lost(tmp_path: Path) -> None:
         for _ in range(KILLS):
             tasks = [asyncio.create_task(writer.write(editor, graph)) for writer in writers]
             for writer in writers:  # on a busy machine the first word takes its time
-                await eventually(lambda writer=writer: writer.acknowledged > 0)
+                await wait_until(lambda writer=writer: writer.acknowledged > 0)
             await asyncio.sleep(random.uniform(0.3, 1.0))
             await asyncio.to_thread(editor.kill)
             await asyncio.wait_for(asyncio.gather(*tasks), 20)

@@ -20,8 +20,9 @@ from temoto_msgs.msg import UmrfGraphStart, UmrfGraphStop
 
 from action_assistant.runner.links.port import GraphOutline, Order, Registration
 from action_assistant.umrf.facts import PINNED
-from ros.test_ros2_link import eventually, reach
+from ros.test_ros2_link import reach
 from support.real_engine import needs_engine, real_engine
+from support.waiting import wait_until
 
 pytestmark = [needs_engine, pytest.mark.timeout(120)]
 
@@ -64,20 +65,20 @@ async def test_both_graphs_begin_although_one_engine_was_busy_with_a_stop(
             )
             tasks.start_soon(david.run)
             tasks.start_soon(eve.run)
-            await eventually(lambda: david.standing.servers == eve.standing.servers == 2)
-            await eventually(lambda: starts.get_subscription_count() >= 3)
+            await wait_until(lambda: david.standing.servers == eve.standing.servers == 2)
+            await wait_until(lambda: starts.get_subscription_count() >= 3)
             await anyio.sleep(1)  # who is seen may not have seen us yet
             slow = umrf("slow", "OxSlowStop", delay=60, stop_time=1.0)
             starts.publish(
                 UmrfGraphStart(umrf_graph_name="slow", umrf_graph_json=slow, targets=["David"])
             )
-            await eventually(lambda: davids() == ["begin"])
+            await wait_until(lambda: davids() == ["begin"])
             stops.publish(UmrfGraphStop(umrf_graph_name="slow", targets=["David"]))
-            await eventually(lambda: davids() == ["begin", "stop"])
+            await wait_until(lambda: davids() == ["begin", "stop"])
             await david.start(order("r1"))
             await eve.start(order("r2"))
-            await eventually(lambda: davids() == ["begin", "stop", "end", "begin"])
-            await eventually(lambda: eves() == ["begin"])
+            await wait_until(lambda: davids() == ["begin", "stop", "end", "begin"])
+            await wait_until(lambda: eves() == ["begin"])
             tasks.cancel_scope.cancel()
     somebody.destroy_node()
     context.try_shutdown()

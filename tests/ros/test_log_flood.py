@@ -10,7 +10,8 @@ pytest.importorskip(
 
 from action_assistant.runner.links.port import EngineLog, ForeignCommand, Report
 from ros.echo_engine import EchoEngine
-from ros.test_ros2_link import answering, engine, eventually, robot
+from ros.test_ros2_link import answering, engine, robot
+from support.waiting import wait_until
 
 _HEARD_S = 0.3  # in which what was published has come
 
@@ -40,9 +41,9 @@ async def test_a_flood_of_log_lines_hides_no_command_of_others(domain: int) -> N
             with link.listen(heard.append):
                 await answering(link)
                 other.speak()
-                await eventually(lambda: link.standing.others == 1)
+                await wait_until(lambda: link.standing.others == 1)
                 flood(node, other)
-                await eventually(lambda: len(places(heard, ForeignCommand)) == 2, 5)
+                await wait_until(lambda: len(places(heard, ForeignCommand)) == 2, 5)
             first, last = places(heard, ForeignCommand)
             commands = [each for each in heard if isinstance(each, ForeignCommand)]
             assert [each.graph for each in commands] == ["first", "last"]

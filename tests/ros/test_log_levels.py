@@ -7,7 +7,8 @@ pytest.importorskip(
 )
 
 from action_assistant.runner.links.port import EngineLog, Report
-from ros.test_ros2_link import answering, engine, eventually, robot
+from ros.test_ros2_link import answering, engine, robot
+from support.waiting import wait_until
 
 TEXT = "Received request to start UMRF graph: patrol"
 LEVELS = ("debug", "info", "warn", "error", "fatal")
@@ -24,5 +25,5 @@ async def test_a_line_comes_with_the_level_with_which_its_node_logged_it(domain:
             with link.listen(heard.append):
                 await answering(link)
                 node.log_on_every_level(TEXT)
-                await eventually(lambda: len(lines()) >= len(LEVELS), 5)
+                await wait_until(lambda: len(lines()) >= len(LEVELS), 5)
     assert lines() == {f"{level} {TEXT}": level for level in LEVELS}

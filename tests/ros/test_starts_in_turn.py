@@ -19,7 +19,8 @@ from action_assistant.runner.links.port import Link, Registration
 from action_assistant.runner.links.ros2 import outlets
 from action_assistant.umrf.facts import PINNED
 from ros.echo_engine import EchoEngine, graph_text
-from ros.test_ros2_link import answering, engine, eventually, placed, reach
+from ros.test_ros2_link import answering, engine, placed, reach
+from support.waiting import wait_until
 
 
 @asynccontextmanager
@@ -53,13 +54,13 @@ async def test_a_busy_engine_takes_its_start_in_before_that_of_another_leaves(do
             asked = david.asked
             david.holding.set()
             tasks.start_soon(to_david.get)
-            await eventually(lambda: david.asked > asked)
+            await wait_until(lambda: david.asked > asked)
             await to_david.start(placed(run="r1"))
             tasks.start_soon(to_eve.start, placed(run="r2"))
             await anyio.sleep(0.5)
             assert (runs(david), runs(eve)) == ([], ["david"])
             david.holding.clear()
-            await eventually(lambda: runs(eve) == runs(david) == ["david", "eve"])
+            await wait_until(lambda: runs(eve) == runs(david) == ["david", "eve"])
 
 
 async def test_a_report_of_the_run_lets_the_next_start_leave(
@@ -75,7 +76,7 @@ async def test_a_report_of_the_run_lets_the_next_start_leave(
             eve.running = [graph_text(run="r2")]
             await to_eve.get()
             await to_david.start(placed(run="r3"))
-            await eventually(lambda: runs(eve) == runs(david) == ["david", "eve", "david"])
+            await wait_until(lambda: runs(eve) == runs(david) == ["david", "eve", "david"])
 
 
 async def test_an_engine_that_shows_nothing_holds_up_no_other_for_long(
@@ -89,7 +90,7 @@ async def test_an_engine_that_shows_nothing_holds_up_no_other_for_long(
             began = time.monotonic()
             await to_eve.start(placed(run="r2"))
             assert time.monotonic() - began >= 0.4
-            await eventually(lambda: runs(eve) == runs(david) == ["david", "eve"])
+            await wait_until(lambda: runs(eve) == runs(david) == ["david", "eve"])
 
 
 async def test_a_start_that_is_given_up_before_its_turn_has_certainly_not_left(

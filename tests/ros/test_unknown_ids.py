@@ -13,7 +13,8 @@ from action_assistant.runner.links.port import NotSent
 from action_assistant.runner.links.ros2 import checkup
 from action_assistant.runner.links.ros2 import domain as domains
 from action_assistant.runner.links.ros2.ros_values import Endpoint
-from ros.test_ros2_link import answering, clock_us, engine, eventually, placed, robot
+from ros.test_ros2_link import answering, clock_us, engine, placed, robot
+from support.waiting import wait_until
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ async def test_an_answer_proves_nothing_a_start_is_refused_and_a_stop_leaves(dom
                 await link.start(placed())
             with pytest.raises(NotSent, match="does not show whether"):
                 await link.stop("patrol")
-            await eventually(lambda: node.commands("stop"))
+            await wait_until(lambda: node.commands("stop"))
             assert node.commands("start") == []
 
 

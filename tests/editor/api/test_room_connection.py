@@ -10,9 +10,10 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages as wire
 from action_assistant.web.auth.keys import Keys
-from editor.api.test_sockets import acks, closed, eventually, masked, things, upgraded
+from editor.api.test_sockets import acks, closed, masked, things, upgraded
 from editor.process import Editor, running
 from support.product import TOKEN
+from support.waiting import wait_until
 
 
 @pytest.fixture(scope="module", params=["direct", "asgi"])
@@ -47,7 +48,7 @@ async def test_stock_clients_converge(either: Editor) -> None:
     one, two, graph = Doc[Any](), Doc[Any](), new_graph(either)
     async with either.joined(graph, one), either.joined(graph, two):
         one.get("meta", type=Map)["name"] = "renamed"
-        await eventually(lambda: things(one) == things(two) and things(two)["name"] == "renamed")
+        await wait_until(lambda: things(one) == things(two) and things(two)["name"] == "renamed")
 
 
 async def test_a_viewer_is_sent_the_epoch_at_once(either: Editor) -> None:
@@ -67,7 +68,7 @@ async def test_a_burst_is_taken_whole_and_in_order(either: Editor) -> None:
         async with either.joined(graph, doc), either.socket(graph, "?acks=1") as listener:
             await listener.send_bytes(wire.question(b"\x00"))
             await asyncio.to_thread(raw.sendall, b"".join(map(masked, burst)))
-            await eventually(lambda: doc.get("positions", type=Map).get("5") == 999.0)
+            await wait_until(lambda: doc.get("positions", type=Map).get("5") == 999.0)
             while (await acks(listener, 0, patience=20))[1] < 1001:
                 pass
         assert len(doc.get("positions", type=Map)) == 7
@@ -86,7 +87,7 @@ async def test_a_message_in_pieces_is_one(either: Editor) -> None:
         async with either.joined(graph, doc):
             for byte in b"".join(pieces):
                 raw.sendall(bytes((byte,)))
-            await eventually(lambda: doc.get("positions", type=Map).get("0") == 0.0)
+            await wait_until(lambda: doc.get("positions", type=Map).get("0") == 0.0)
         raw.settimeout(5)
         answer = b""
         while b"\x8a\x01?" not in answer:  # the pong

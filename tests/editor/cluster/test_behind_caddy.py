@@ -5,6 +5,7 @@ import contextlib
 import os
 import re
 import shutil
+import socket
 import ssl
 import subprocess
 import sys
@@ -32,7 +33,7 @@ class Installation:
 
     def __init__(self, folder: Path, database: str) -> None:
         self._folder = folder
-        self._port = free_ports()
+        self._port = _port_of_editors()
         self._public = free_ports()
         self.url = f"https://localhost:{self._public}"
         (folder / "data").mkdir()
@@ -59,9 +60,16 @@ class Installation:
 
     def begin(self, number: int) -> "subprocess.Popen[bytes]":
         """Start one editor."""
-        with (self._folder / f"editor-{number}.log").open("wb") as log:
+        with self._log(number).open("wb") as log:
             words = ["sh", str(self._image(number)), "run", "editor"]
             return subprocess.Popen(words, env=self._env, stdout=log, stderr=log)
+
+    def _log(self, number: int) -> Path:
+        return self._folder / f"editor-{number}.log"
+
+    def log(self, number: int) -> str:
+        """Return what an editor has written."""
+        return self._log(number).read_text()
 
     def is_healthy(self, number: int) -> bool:
         """Return whether an editor says that it is ready, as its health check asks."""
@@ -102,6 +110,15 @@ class Installation:
         return ssl.create_default_context(cafile=str(root))
 
 
+def _port_of_editors() -> int:
+    """Return a port that is free, as that for other editors is, which is 400 above it."""
+    while True:
+        port = free_ports()
+        with socket.socket() as beside, contextlib.suppress(OSError):
+            beside.bind(("127.0.0.1", port + 400))
+            return port
+
+
 def _until(ask: Callable[[], bool]) -> None:
     """Wait until the answer is yes."""
     deadline = time.monotonic() + 120
@@ -110,6 +127,7 @@ def _until(ask: Callable[[], bool]) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.timeout(300)
 def test_a_killed_editor_of_three_is_not_missed_behind_the_proxy_of_compose(
     tmp_path: Path, postgres: Server
 ) -> None:
@@ -122,8 +140,9 @@ def test_a_killed_editor_of_three_is_not_missed_behind_the_proxy_of_compose(
             return process
 
         editors = [kept(installation.begin(number)) for number in range(COUNT)]
-        for number in range(COUNT):
-            _until(lambda number=number: installation.is_healthy(number))
+        for number, process in enumerate(editors):
+            _until(lambda: process.poll() is not None or installation.is_healthy(number))  # noqa: B023
+            assert process.poll() is None, installation.log(number)
         assert {installation.address(n) for n in range(COUNT)} == {
             "127.0.0.1",
             "127.0.0.2",
