@@ -54,8 +54,8 @@ class Installation:
         script = (ROOT / "scripts" / "image").read_text()
         program = "/opt/action-assistant/bin/action-assistant"
         assert program in script
-        script = script.replace(program, f"{sys.executable} -m action_assistant")
-        (own / "image").write_text(script.replace("/tmp/", f"{own}/"))
+        script = script.replace("/tmp/", f"{own}/")  # first: the interpreter may be in /tmp, too
+        (own / "image").write_text(script.replace(program, f"{sys.executable} -m action_assistant"))
         return own / "image"
 
     def begin(self, number: int) -> "subprocess.Popen[bytes]":
