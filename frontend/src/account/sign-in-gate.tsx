@@ -12,7 +12,6 @@ import {
   credentialIn,
   currentPerson,
   type InvitationPreview,
-  identityOf,
   openSession,
   type Person,
   readInvitation,
@@ -162,7 +161,7 @@ function useStopOf(gate: Gate): void {
     if (gate.at === "knocking") return;
     const person = gate.at === "inside" ? gate.person : rememberedPerson();
     if (person === null) pageLink.leave();
-    else pageLink.enter(identityOf(person), visitOf(gate), person);
+    else pageLink.enter(person, visitOf(gate));
   }, [gate]);
   const { at } = gate;
   useEffect(() => {
@@ -170,7 +169,7 @@ function useStopOf(gate: Gate): void {
     let gone = false;
     const onFound = (person: Person) => {
       if (gone) return;
-      pageLink.enter(identityOf(person), 0, person);
+      pageLink.enter(person, 0);
       rememberPerson(person);
     };
     currentPerson().then(onFound, () => {}); // without a session there is nobody to keep it for

@@ -22,6 +22,9 @@ let asked: number;
 let posted: string[];
 const page = Object.assign(new EventTarget(), { hidden: false, querySelector: () => null });
 
+const ADA = { id: "a", role: "operator", name: "Ada" } as const;
+const BOB = { id: "b", role: "operator", name: "Bob" } as const;
+
 beforeEach(async () => {
   vi.resetModules();
   ({ pageLink } = await import("./page-link"));
@@ -41,7 +44,7 @@ beforeEach(async () => {
     const several = runners.length > 1 ? { runners } : {};
     return Response.json({ runner_url: A.url, ...several });
   });
-  pageLink.enter("ada", 1);
+  pageLink.enter(ADA, 1);
   await pass(10);
 });
 
@@ -178,7 +181,7 @@ test("whoever signs in while a STOP ALL is not proven keeps it, and dials anew",
   pageLink.now().live?.stop("all");
   pageLink.leave();
   const before = Wire.all.length;
-  pageLink.enter("ada", 1);
+  pageLink.enter(ADA, 1);
   expect(Wire.all.length - before).toBe(2);
   await pass(100);
   hear();
@@ -186,8 +189,6 @@ test("whoever signs in while a STOP ALL is not proven keeps it, and dials anew",
   expect(pageLink.now().signedIn).toBe(true);
 });
 
-const ADA = { id: "a", name: "Ada" };
-const BOB = { id: "b", name: "Bob" };
 const said = () => {
   const now = pageLink.now().live?.state;
   return now && plain(wholeNotice(now, new Set(), performance.now())?.text);
@@ -196,17 +197,17 @@ const said = () => {
 test("a STOP ALL that no runner has heard is not sent in the name of somebody else, and said not to be", async () => {
   chunk.fails = false;
   await pass(6_000);
-  pageLink.enter("ada viewer", 2, ADA);
+  pageLink.enter({ ...ADA, role: "viewer" }, 2);
   hear();
   const { heard, end } = silence();
   pageLink.now().live?.stop("all");
   await pass(100);
   pageLink.leave();
   await pass(100);
-  pageLink.enter("ada operator", 3, ADA);
+  pageLink.enter(ADA, 3);
   expect(pageLink.now().live?.state.stops).toMatchObject([{ state: "unheard" }]); // the same person
   pageLink.leave();
-  pageLink.enter("bob", 4, BOB);
+  pageLink.enter(BOB, 4);
   await pass(10);
   hear();
   expect(said()).toMatch(
@@ -236,11 +237,11 @@ test("a STOP ALL of somebody who has left before any runner was known is said no
     return answered(url, init);
   });
   runners = [A];
-  pageLink.enter("ada", 1, ADA);
+  pageLink.enter(ADA, 1);
   pageLink.now().live?.stop("all");
   pageLink.leave();
   await pass(8 * 3_600_000);
-  pageLink.enter("bob", 2, BOB);
+  pageLink.enter(BOB, 2);
   expect(said()).toContain("NOT SENT: STOP ALL of Ada");
   isSilent = false;
   await pass(10_000);
@@ -254,7 +255,7 @@ test("a STOP ALL of somebody who has left before any runner was known is said no
 test("whoever comes back has the sockets of all again", async () => {
   pageLink.leave();
   const before = Wire.all.length;
-  pageLink.enter("bob", 2);
+  pageLink.enter(BOB, 2);
   expect(Wire.all.length - before).toBe(2); // also before the editor has answered
 });
 

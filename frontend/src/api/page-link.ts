@@ -8,6 +8,7 @@ import { editor } from "./client";
 import { errorText } from "./http";
 import { type LiveState, stateOf } from "./live-socket";
 import { NOTHING, RunnerSockets } from "./runner-sockets";
+import { identityOf, type Person } from "./session";
 import type { Site } from "./sites";
 
 export interface PageLinkState {
@@ -53,7 +54,8 @@ class PageLink {
    * name or visit dials anew, since the socket is known by the old one. Nothing that another person has asked for is
    * sent in the name of this one.
    */
-  enter(who: string, visit: number, person = { id: who, name: who }): void {
+  enter(person: Person, visit: number): void {
+    const who = identityOf(person);
     this.#endWait();
     const before = this.#person;
     this.#person = person;

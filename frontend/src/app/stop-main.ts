@@ -2,7 +2,7 @@
 import "../ui/tokens.css";
 import { pageLink } from "../api/page-link";
 import { isViewPage } from "../api/page-url";
-import { credentialIn, identityOf, rememberedPerson } from "../api/session";
+import { credentialIn, rememberedPerson } from "../api/session";
 import { outliveOutsideChanges } from "../runs/stop/outside-changes";
 import { mountStop } from "../runs/stop/stop-root";
 import { changedFromOutside, pageError } from "../runs/stop/stop-surroundings";
@@ -21,7 +21,7 @@ if (isViewPage) {
   // A link in the address signs somebody in first.
   const person = rememberedPerson();
   if (person !== null && credentialIn(location.hash) === null) {
-    pageLink.enter(identityOf(person), 1);
+    pageLink.enter(person, 1);
   }
 }
 
