@@ -9,8 +9,7 @@ import socket
 import ssl
 import subprocess
 import sys
-import time
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -20,6 +19,7 @@ import yaml
 from editor.process import BEARER
 from journal.servers import Server
 from support.product import TOKEN, free_ports
+from support.waiting import until
 
 ROOT = Path(__file__).parents[3]
 CADDY = shutil.which("caddy", path=f"{os.environ['PATH']}:/usr/local/bin") or ""
@@ -106,7 +106,7 @@ class Installation:
     def trust(self) -> ssl.SSLContext:
         """Return what trusts the proxy's own authority, once there is one."""
         root = self._folder / "caddy/pki/authorities/local/root.crt"
-        _until(root.exists)
+        until("Caddy made its certificate", root.exists, 120)
         return ssl.create_default_context(cafile=str(root))
 
 
@@ -117,14 +117,6 @@ def _port_of_editors() -> int:
         with socket.socket() as beside, contextlib.suppress(OSError):
             beside.bind(("127.0.0.1", port + 400))
             return port
-
-
-def _until(ask: Callable[[], bool]) -> None:
-    """Wait until the answer is yes."""
-    deadline = time.monotonic() + 120
-    while not ask():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
 
 
 @pytest.mark.timeout(300)
@@ -141,7 +133,8 @@ def test_a_killed_editor_of_three_is_not_missed_behind_the_proxy_of_compose(
 
         editors = [kept(installation.begin(number)) for number in range(COUNT)]
         for number, process in enumerate(editors):
-            _until(lambda: process.poll() is not None or installation.is_healthy(number))  # noqa: B023
+            has_begun = partial(_has_begun, installation, number, process)
+            until(f"editor {number} has begun", has_begun, 120)
             assert process.poll() is None, installation.log(number)
         assert {installation.address(n) for n in range(COUNT)} == {
             "127.0.0.1",
@@ -162,7 +155,7 @@ def test_a_killed_editor_of_three_is_not_missed_behind_the_proxy_of_compose(
                     return page.get("/api/graphs").is_success
                 return False
 
-            _until(answers)
+            until("the proxy answers", answers, 120)
             graphs = [
                 page.post("/api/graphs", json={"name": f"g{n}"}).json()["id"] for n in range(9)
             ]
@@ -170,14 +163,19 @@ def test_a_killed_editor_of_three_is_not_missed_behind_the_proxy_of_compose(
                 assert page.patch(f"/api/graphs/{graph}", json={"description": "before"}).is_success
             editors[_first(installation)].kill()
             for graph in graphs:
-                _until(
-                    lambda graph=graph: (
-                        page.patch(f"/api/graphs/{graph}", json={"name": "after"}).is_success
-                    )
-                )
+                until("a graph is renamed", partial(_renamed, page, graph), 120)
             assert {page.get(f"/api/graphs/{graph}").json()["name"] for graph in graphs} == {
                 "after"
             }
+
+
+def _has_begun(installation: Installation, number: int, process: "subprocess.Popen[bytes]") -> bool:
+    """Return whether an editor is ready, or has ended."""
+    return process.poll() is not None or installation.is_healthy(number)
+
+
+def _renamed(page: httpx.Client, graph: str) -> bool:
+    return page.patch(f"/api/graphs/{graph}", json={"name": "after"}).is_success
 
 
 def _first(installation: Installation) -> int:

@@ -107,7 +107,7 @@ async def test_a_file_that_cannot_be_looked_for_is_logged_once_and_keeps_nobody_
 async def test_an_editor_that_died_with_its_last_beat_in_the_future_counts_for_nothing(
     tmp_path: Path, postgres: Server
 ) -> None:
-    """As after the clock of the database was set back."""
+    # Its last beat is in the future once somebody has set the clock of the database back.
     with several(tmp_path, postgres.new_database(), 2) as (one, two):
         graph = asked(two, "POST", "/api/graphs", json={"name": "task"})["id"]
         link = asked(two, "POST", "/api/members", json={"name": "Kadri", "role": "viewer"})
