@@ -246,6 +246,7 @@ export function RowActions(props: RowActionsProps) {
             onClick={() => handlers.run(rowAction, row)}
           >
             {rowAction.label}
+            {rowAction.detail && <div className="quiet-12">{rowAction.detail}</div>}
           </Menu.Item>
         ))}
       </Menu.Dropdown>

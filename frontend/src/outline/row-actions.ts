@@ -2,7 +2,7 @@
 
 import type { EditorStore } from "../canvas/editor-store";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { PLAIN, readBreakpoint } from "../graph/breakpoints";
+import { breakpointWords, PLAIN, readBreakpoint } from "../graph/breakpoints";
 import { relationId } from "../graph/document-keys";
 import {
   asOneEdit,
@@ -34,6 +34,8 @@ export interface RowAction {
     | "enter"
     | "expand";
   readonly label: string;
+  /** What is changed, where the label does not say all of it. */
+  readonly detail?: string;
   /** The key as `keyOf` names it, with `Alt+` before it where needed. */
   readonly key: string;
   readonly changes: boolean;
@@ -84,8 +86,12 @@ export function rowActionsOf(row: OutlineItem, store: EditorStore): readonly Row
       return [{ ...CONNECT, label: "Start with …" }];
     case "action": {
       const { breakpoint, missing } = row.action;
-      const label = readBreakpoint(breakpoint) === null ? WAIT.label : "Remove the breakpoint";
-      const wait = missing ? [] : [{ ...WAIT, label }];
+      const set = readBreakpoint(breakpoint);
+      const remove = set && {
+        label: "Remove the breakpoint",
+        detail: breakpointWords(set, "action"),
+      };
+      const wait = missing ? [] : [{ ...WAIT, ...remove }];
       const inside = levelActions(row.action, store);
       return [DETAILS, ...inside, RENAME, CONNECT, ...wait, TALK, UP, DOWN, DELETE];
     }
