@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { type SiteRouter, setSiteRouter, setSites } from "../api/sites";
 import { courseOf } from "./course-bar";
-import { byDay, type RunOfList, runsBefore, unlikeChosen } from "./run-list";
+import { byDay, comparisonObstacle, type RunOfList, runsBefore } from "./run-list";
 
 const NOW = Date.parse("2026-11-24T12:00:00");
 const DAY = 86_400_000;
@@ -78,8 +78,8 @@ test("a run is compared with runs of its own site only", () => {
   setSiteRouter({ siteOfId: siteOf } as SiteRouter);
   const runs = [run(4, "a"), run(3, "a"), run(2, "a")];
   expect([...runsBefore(runs)].map(([later, { id }]) => [later, id])).toEqual([["r4", "r2"]]);
-  expect(unlikeChosen("r3", ["r4"])).toContain("Hall A");
-  expect([unlikeChosen("r2", ["r4"]), unlikeChosen("r3", [])]).toEqual(["", ""]);
+  expect(comparisonObstacle("r3", ["r4"])).toContain("Hall A");
+  expect([comparisonObstacle("r2", ["r4"]), comparisonObstacle("r3", [])]).toEqual(["", ""]);
   setSiteRouter(undefined);
   setSites([]);
 });

@@ -13,6 +13,7 @@ import { RunList, type RunOfList } from "./run-list";
 standInForBrowser();
 
 const MINUTE = 60_000;
+const A = { name: "Hall A", url: "http://a" };
 const B = { name: "Hall B", url: "http://b" };
 
 beforeEach(() => {
@@ -46,24 +47,30 @@ function runSince(begin: number): RunOfList {
   } as unknown as RunOfList;
 }
 
-test("a run at a site whose clock is ahead has its course and its time by that clock", async () => {
-  vi.stubGlobal("fetch", () => new Promise(() => undefined));
-  setSites([{ name: "Hall A", url: "http://a" }, B]);
-  setSiteRouter({ siteOfId: () => B, shiftOf: () => -MINUTE } as unknown as SiteRouter);
-  const present = serverNow() + MINUTE; // by the clock of the site
-  const run = runSince(present - MINUTE);
+/** Show runs in the list, of which some are chosen to be compared. Returns how to take it away. */
+async function show(runs: readonly RunOfList[], chosen: readonly string[] = []) {
   const root = createRoot(document.body.appendChild(document.createElement("div")));
   await act(async () =>
     root.render(
       <MantineProvider env="test">
         <PersonContext value={{ person: { id: "a", name: "Ada" } } as SignedIn}>
           <QueryClientProvider client={new QueryClient()}>
-            <RunList runs={[run]} chosen={[]} onChoose={() => {}} isGapless goesOn={false} />
+            <RunList runs={runs} chosen={chosen} onChoose={() => {}} isGapless goesOn={false} />
           </QueryClientProvider>
         </PersonContext>
       </MantineProvider>,
     ),
   );
+  return () => act(() => root.unmount());
+}
+
+test("a run at a site whose clock is ahead has its course and its time by that clock", async () => {
+  vi.stubGlobal("fetch", () => new Promise(() => undefined));
+  setSites([A, B]);
+  setSiteRouter({ siteOfId: () => B, shiftOf: () => -MINUTE } as unknown as SiteRouter);
+  const present = serverNow() + MINUTE; // by the clock of the site
+  const run = runSince(present - MINUTE);
+  const leave = await show([run]);
   const course = [...document.querySelectorAll<HTMLElement>("[role=img] > *")];
   const parts = course.map(({ dataset, style }) => [dataset.tone, Number(style.flexGrow)]);
   expect(parts).toEqual([
@@ -71,5 +78,23 @@ test("a run at a site whose clock is ahead has its course and its time by that c
     ["run", 30],
   ]);
   expect(document.body.textContent).toContain("1:00");
-  act(() => root.unmount());
+  leave();
+});
+
+test("while a run is chosen, the list says once why those of another site cannot be", async () => {
+  vi.stubGlobal("fetch", () => new Promise(() => undefined));
+  setSites([A, B]);
+  const siteOfId = (id: string) => (id === "r" ? A : B);
+  setSiteRouter({ siteOfId, shiftOf: () => 0 } as unknown as SiteRouter);
+  const run = runSince(serverNow() - MINUTE);
+  const runs = [run, { ...run, id: "s", number: 2 }, { ...run, id: "t", number: 3 }];
+  const leave = await show(runs, ["r"]);
+  expect(document.querySelector("[role=status]")?.textContent).toMatch(/^Only runs of .*Hall A/);
+  const boxes = [...document.querySelectorAll<HTMLInputElement>("[type=checkbox]")];
+  const reasons = boxes.map((box) => box.getAttribute("aria-describedby") ?? "");
+  const [, one, two] = reasons.map((id) => id && document.getElementById(id)?.textContent);
+  expect(reasons[0]).toBe("");
+  expect([one, two]).toEqual([one, expect.stringContaining("Hall A")]);
+  expect(boxes.map(({ disabled }) => disabled)).toEqual([false, true, true]);
+  leave();
 });

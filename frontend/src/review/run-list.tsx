@@ -2,7 +2,7 @@
 
 import { ActionIcon, Checkbox } from "@mantine/core";
 import { IconArrowsDiff, IconChartBar, IconPinFilled } from "@tabler/icons-react";
-import { type MouseEvent, useEffect, useMemo, useRef } from "react";
+import { type MouseEvent, useEffect, useId, useMemo, useRef } from "react";
 import { Link, useLocation } from "wouter";
 import { useCurrentName } from "../api/people";
 import type { ListedRun } from "../api/review";
@@ -121,11 +121,11 @@ const siteName = (run: string) => {
 };
 
 /** Return why a run cannot be compared with the chosen ones; "" if it can. */
-export function unlikeChosen(run: string, chosen: readonly string[]): string {
+export function comparisonObstacle(run: string, chosen: readonly string[]): string {
   const site = siteOfId(run);
   const other = chosen.map(siteOfId).find((each) => each !== site);
   if (other === undefined || site === undefined) return "";
-  return `The chosen run is of ${isolated(other.name)}: only runs of one site can be compared.`;
+  return `Only runs of ${isolated(other.name)} can be chosen: those of two sites are not compared.`;
 }
 
 interface RunRowProps {
@@ -133,14 +133,14 @@ interface RunRowProps {
   /** The present by the clock of the run's runner. */
   now: number;
   chosen: boolean;
-  /** Why it cannot be chosen; "" if it can. */
-  unlike: string;
+  /** The id of the text that says why it cannot be chosen; undefined if it can. */
+  obstacle: string | undefined;
   onChoose: (chosen: boolean) => void;
   /** Null: there is none. Undefined: it is not in the list. */
   before: RunOfList | null | undefined;
 }
 
-function Row({ run, now, chosen, unlike, onChoose, before }: RunRowProps) {
+function Row({ run, now, chosen, obstacle, onChoose, before }: RunRowProps) {
   const [, go] = useLocation();
   const by = useCurrentName(run.author);
   const label = useVersionLabel(run);
@@ -158,8 +158,8 @@ function Row({ run, now, chosen, unlike, onChoose, before }: RunRowProps) {
           size="xs"
           aria-label={`Choose run ${run.number} to compare`}
           checked={chosen}
-          disabled={run.hidden === true || unlike !== ""}
-          title={unlike === "" ? undefined : unlike}
+          disabled={run.hidden === true || obstacle !== undefined}
+          aria-describedby={obstacle}
           onChange={(event) => onChoose(event.currentTarget.checked)}
         />
       </td>
@@ -249,47 +249,55 @@ export function RunList({ runs, chosen, onChoose, isGapless, goesOn }: RowsProps
   const table = useRowKeys();
   const before = useMemo(() => runsBefore(isGapless ? runs : []), [runs, isGapless]);
   const isLast = isGapless && !goesOn;
+  const reasonId = useId();
+  const obstacles = new Map(runs.map(({ id }) => [id, comparisonObstacle(id, chosen)]));
+  const reason = [...obstacles.values()].find((each) => each !== "");
   return (
-    <div className="border bg-panel rounded-card shadow scroll-x">
-      <table ref={table} className={style.table} data-choosing={chosen.length > 0 || undefined}>
-        <thead>
-          <tr>
-            <th>
-              <span className={style.hidden}>Compare</span>
-            </th>
-            <th>Run</th>
-            <th>Result</th>
-            <th>Course</th>
-            <th>On</th>
-            <th>Started by</th>
-            <th>Started</th>
-            <th className={style.took}>Took</th>
-            <th>
-              <span className={style.hidden}>More</span>
-            </th>
-          </tr>
-        </thead>
-        {byDay(runs, now).map((group) => (
-          <tbody key={group.key}>
-            <tr className={style.day}>
-              <th scope="rowgroup" colSpan={COLUMNS}>
-                {group.day}
+    <div>
+      <div role="status" id={reasonId}>
+        {reason !== undefined && <p className="m-0 quiet-12">{reason}</p>}
+      </div>
+      <div className="border bg-panel rounded-card shadow scroll-x">
+        <table ref={table} className={style.table} data-choosing={chosen.length > 0 || undefined}>
+          <thead>
+            <tr>
+              <th>
+                <span className={style.hidden}>Compare</span>
+              </th>
+              <th>Run</th>
+              <th>Result</th>
+              <th>Course</th>
+              <th>On</th>
+              <th>Started by</th>
+              <th>Started</th>
+              <th className={style.took}>Took</th>
+              <th>
+                <span className={style.hidden}>More</span>
               </th>
             </tr>
-            {group.runs.map((run) => (
-              <Row
-                key={run.id}
-                run={run}
-                now={now - shiftOfRun(run.id)}
-                chosen={chosen.includes(run.id)}
-                unlike={unlikeChosen(run.id, chosen)}
-                onChoose={(on) => onChoose(run.id, on)}
-                before={before.get(run.id) ?? (isLast ? null : undefined)}
-              />
-            ))}
-          </tbody>
-        ))}
-      </table>
+          </thead>
+          {byDay(runs, now).map((group) => (
+            <tbody key={group.key}>
+              <tr className={style.day}>
+                <th scope="rowgroup" colSpan={COLUMNS}>
+                  {group.day}
+                </th>
+              </tr>
+              {group.runs.map((run) => (
+                <Row
+                  key={run.id}
+                  run={run}
+                  now={now - shiftOfRun(run.id)}
+                  chosen={chosen.includes(run.id)}
+                  obstacle={obstacles.get(run.id) ? reasonId : undefined}
+                  onChoose={(on) => onChoose(run.id, on)}
+                  before={before.get(run.id) ?? (isLast ? null : undefined)}
+                />
+              ))}
+            </tbody>
+          ))}
+        </table>
+      </div>
     </div>
   );
 }
