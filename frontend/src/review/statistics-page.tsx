@@ -287,11 +287,12 @@ function GraphChoice({ graph }: { graph: string }) {
   const [, go] = useLocation();
   const names = useGraphNames();
   const known = (names.data ?? []).map(({ id, name }) => ({ value: id, label: name }));
-  const strange = names.isPending ? "…" : "A graph that is not in the list";
+  const strange = names.isSuccess ? "A graph that is not in the list" : "…";
   const isKnown = graph === "" || known.some(({ value }) => value === graph);
   return (
     <Select
       aria-label="Graph"
+      error={names.isError && errorText(names.error)}
       placeholder={names.data?.length === 0 ? "No graph yet" : "Choose a graph"}
       data={isKnown ? known : [...known, { value: graph, label: strange }]}
       searchable
