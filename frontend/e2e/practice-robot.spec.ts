@@ -16,7 +16,7 @@ test("after the server was away the practice robot is gone, and one press starts
   test.slow();
   const { page, failures } = await product.person(browser, "Ada");
   const card = page.getByRole("article", { name: "Practice" });
-  const again = card.getByRole("button", { name: "Start it again" });
+  const again = card.getByRole("button", { name: "Start the practice robot again" });
   await page.goto(`${product.url}/robots`);
   await page.getByRole("button", { name: "Practice robot" }).click();
   await expect(card).toContainText("answers", { timeout: 30_000 });
@@ -24,7 +24,7 @@ test("after the server was away the practice robot is gone, and one press starts
   await product.kill();
   await product.start();
   await expect(card).toContainText("gone", { timeout: 30_000 });
-  await expect(card).toContainText("A practice robot ends with the server");
+  await expect(card).toContainText("It ended with its runner.");
   await again.click();
   await expect(card).toContainText("answers", { timeout: 30_000 });
   await expect(again).toBeHidden();

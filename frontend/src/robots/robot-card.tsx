@@ -46,8 +46,8 @@ interface Props {
   robot: Robot;
   onEdit: (robot: Registration) => void;
   onImport: (text: string, name: string) => void;
-  /** Brings a robot back that is gone. */
-  wayBack?: ReactNode;
+  /** Restarts a practice robot that is gone. */
+  restartControl?: ReactNode;
 }
 
 type Sign = { good: boolean; text: string; age?: string };
@@ -238,7 +238,7 @@ function StopHere({ robot }: { robot: Robot }) {
   );
 }
 
-export function RobotCard({ robot, onEdit, onImport, wayBack }: Props) {
+export function RobotCard({ robot, onEdit, onImport, restartControl }: Props) {
   const [open, setOpen] = useState<string | null>(null);
   const linked = robot.state !== "no_link";
   const count = (n: number | null, what: string) =>
@@ -258,7 +258,7 @@ export function RobotCard({ robot, onEdit, onImport, wayBack }: Props) {
       <Drills robot={robot} />
       <WhyNot robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
-      {wayBack}
+      {restartControl}
       <Signs robot={robot} />
       <RobotRuns robot={robot} onImport={onImport} />
       {linked && (
@@ -302,7 +302,7 @@ function parameters(inputs: Record<string, string>): string {
 
 function IndexedActions({ robot }: { robot: string }) {
   const { runner } = useLive();
-  const known = useIndexedByRobot(runner, robot, true);
+  const known = useIndexedByRobot(runner, robot);
   if (known.isPending) return <Text c="dimmed">Reading …</Text>;
   if (known.isError) return <Text c="var(--error)">Its index cannot be read now.</Text>;
   const { actions, graphs, unread } = known.data;

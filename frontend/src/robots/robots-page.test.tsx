@@ -23,7 +23,9 @@ const page = vi.hoisted(() => ({ now: {} as object }));
 
 vi.mock("../api/page-link", () => ({ useLive: () => ({ runner: A.url, now: page.now }) }));
 vi.mock("./robot-card", () => ({
-  RobotCard: ({ wayBack }: { wayBack?: ReactNode }) => <article>{wayBack}</article>,
+  RobotCard: ({ restartControl }: { restartControl?: ReactNode }) => (
+    <article>{restartControl}</article>
+  ),
 }));
 
 const FOUND = { actor: "Dora", domain: 42, get_service: "get", generation: "", problem: "" };
@@ -102,7 +104,9 @@ test("a practice robot is started again at its own site, while that answers", as
   };
   const button = () => document.querySelector<HTMLButtonElement>("article button");
   await draw("live");
-  await vi.waitFor(() => act(async () => expect(button()?.textContent).toBe("Start it again")));
+  await vi.waitFor(() =>
+    act(async () => expect(button()?.textContent).toBe("Start the practice robot again")),
+  );
   await act(async () => button()?.click());
   await vi.waitFor(() => expect(posted).toEqual([`${B.url}/api/practice`]));
   others = ["Practice"];

@@ -54,10 +54,10 @@ function PracticeButton({ runner, again = false }: { runner: string; again?: boo
       variant="default"
       leftSection={<IconRobot size={16} aria-hidden />}
       loading={start.isPending}
-      title="Starts an emulated robot on the server’s computer; it moves nothing"
+      title="Starts an emulated robot on the runner’s computer; it moves nothing"
       onClick={() => start.mutate()}
     >
-      {again ? "Start it again" : "Practice robot"}
+      {again ? "Start the practice robot again" : "Practice robot"}
     </Button>
   );
 }
@@ -68,7 +68,7 @@ function PracticeEnded({ runner }: { runner: string }) {
   return (
     <div className="row-wrap gap-50">
       <PracticeButton runner={runner} again />
-      <span className="quiet-xs">A practice robot ends with the server that started it.</span>
+      <span className="quiet-xs">It ended with its runner. It moves nothing.</span>
     </div>
   );
 }
@@ -169,7 +169,7 @@ export function RobotsPage({ onImport }: Props) {
                   robot={robot}
                   onEdit={(robot) => setEditing({ robot, isNew: false })}
                   onImport={onImport}
-                  wayBack={
+                  restartControl={
                     may &&
                     runner !== undefined &&
                     robot.practice_ended &&
