@@ -1,5 +1,5 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
-import { useQuery } from "@tanstack/react-query";
+import { queryOptions, useQuery } from "@tanstack/react-query";
 import { runnerAt, runnerOnlyAt } from "./client";
 import { fetchText } from "./http";
 import type { RunnerApi } from "./schema/runner";
@@ -56,17 +56,17 @@ export function useFoundEngines(runner: string | undefined, on: boolean) {
   });
 }
 
-export function indexedByRobot(runner: string | undefined, name: string, signal: AbortSignal) {
-  return runnerAt(runner).get("/api/robots/{name}/known", { path: { name }, signal });
-}
-
-export function useIndexedByRobot(runner: string | undefined, robot: string, on: boolean) {
-  return useQuery({
-    queryKey: ["robots", "known", robot],
-    queryFn: ({ signal }) => indexedByRobot(runner, robot, signal),
-    enabled: on && runner !== undefined,
-    refetchInterval: 10_000,
+/** The query of what a robot has indexed. */
+export const indexQuery = (runner: string | undefined, name: string) =>
+  queryOptions({
+    queryKey: ["robots", "known", name],
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/robots/{name}/known", { path: { name }, signal }),
+    enabled: runner !== undefined,
   });
+
+export function useIndexedByRobot(runner: string | undefined, robot: string) {
+  return useQuery({ ...indexQuery(runner, robot), refetchInterval: 10_000 });
 }
 
 /** The file of an action that a robot has indexed. */

@@ -4,7 +4,7 @@ import { useMemo } from "react";
 import type { GraphSummary } from "../api/graphs";
 import { importAction } from "../api/library";
 import { useLive } from "../api/page-link";
-import { type IndexedByRobot, indexedAction, indexedByRobot } from "../api/robots";
+import { type IndexedByRobot, indexedAction, indexQuery } from "../api/robots";
 import { flatName, pathOf } from "../graph/document-keys";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/field-words";
@@ -56,9 +56,7 @@ function useIndexedByRobots(
 ): readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[] {
   return useQueries({
     queries: robots.map((robot) => ({
-      queryKey: ["robots", "known", robot],
-      queryFn: ({ signal }: { signal: AbortSignal }) => indexedByRobot(runner, robot, signal),
-      enabled: runner !== undefined,
+      ...indexQuery(runner, robot),
       refetchInterval: 30_000,
     })),
     combine: (answers) =>
