@@ -99,6 +99,7 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
   const [obstacle, setObstacle] = useState("");
+  const [hasWarned, setHasWarned] = useState(false);
   const save = async () => {
     try {
       await rename(name.trim());
@@ -108,7 +109,11 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
     }
   };
   const leave = async () => {
-    if (live?.isStopping && obstacle !== UNPROVEN) return setObstacle(UNPROVEN);
+    if (live?.isStopping && !hasWarned) {
+      setHasWarned(true);
+      setObstacle(UNPROVEN);
+      return;
+    }
     try {
       await signOut(runner);
       await onLeave(person.id);
