@@ -28,7 +28,7 @@ export function fetchHistory(
   id: string,
   limit: number,
   before: number | null,
-  signal: AbortSignal,
+  signal?: AbortSignal,
 ): Promise<HistoryEntry[]> {
   const query = { limit, before: before ?? undefined };
   return editor.get("/api/graphs/{graph_id}/history", { path: inGraph(id), query, signal });
@@ -38,7 +38,7 @@ export function fetchHistory(
 export function fetchDocument(
   id: string,
   at: number,
-  signal: AbortSignal,
+  signal?: AbortSignal,
 ): Promise<EditorApi["PastDocument"]> {
   return editor.get("/api/graphs/{graph_id}/document", {
     path: inGraph(id),

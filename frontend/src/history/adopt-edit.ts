@@ -22,15 +22,14 @@ export async function adoptEdit(
   id: string,
   { kind, author, after }: ServerEdit,
 ): Promise<void> {
-  const { signal } = new AbortController();
-  const entries = await fetchHistory(id, NEWEST, null, signal);
+  const entries = await fetchHistory(id, NEWEST, null);
   const made = entries.find(
     (entry) => entry.kind === kind && entry.author.id === author && entry.seq > after,
   );
   if (made === undefined) return;
   const [before, then] = await Promise.all([
-    fetchDocument(id, made.seq - 1, signal),
-    fetchDocument(id, made.seq, signal),
+    fetchDocument(id, made.seq - 1),
+    fetchDocument(id, made.seq),
     room.shows(made.seq),
   ]);
   undo.adopt(mapsFrom(before), mapsFrom(then));

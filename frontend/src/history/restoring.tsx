@@ -95,7 +95,7 @@ export function useGoingBack(context: EditorContext) {
       await adoptEdit(opened, id, { kind, author: person.id, after: seq }).catch((error: unknown) =>
         notifications.show({
           color: "red",
-          title: "Done, but Undo cannot take it back. The history can.",
+          title: `${kind === "restored" ? "Restored" : "Undone"}, but Ctrl Z cannot undo it. Use History.`,
           message: errorText(error),
         }),
       );
