@@ -1,6 +1,6 @@
 /**
- * Knows which site has which robots and runs, by the live sockets and by earlier answers; chooses the site of each
- * request by it, and joins the answers of several sites.
+ * Sends each request to the site or sites that it is meant for, and joins their answers. What is known of the robots
+ * and runs of each site stands here as well: in a file of its own the page would load it with one request more.
  */
 import { isolated } from "../words/isolated";
 import { errorText, Refusal } from "./http";
