@@ -36,7 +36,7 @@ export interface StopRequest {
   /** Set if it is refused since this runner has no such run. */
   isAbsent?: true;
   /** The name of who asked for it, set if it is refused since somebody else signed in before it was heard. */
-  of?: string;
+  disownedPerson?: string;
   /** The tick at which the runner had it. */
   heardAt?: number;
   /**
@@ -171,7 +171,7 @@ export class LiveSocket {
     const runs = meant.map((each) => each.id);
     const stop: StopRequest = { id, run, at: tick(), runs, state: "asked", detail: "" };
     void this.#keepStopping(stop, first);
-    this.#putStop(stop);
+    this.#set({ stops: withStop(this.state.stops, stop) });
   }
 
   /** "all" is sent as such until it is heard: a run may have begun before it that this page has not seen. */
@@ -194,8 +194,8 @@ export class LiveSocket {
   }
 
   /** Sends a STOP ALL no more that nobody has answered: it is of somebody who is not signed in any more. */
-  disown(of: string): void {
-    const stops = this.state.stops.map((stop) => disowned(stop, of));
+  disown(person: string): void {
+    const stops = this.state.stops.map((stop) => disowned(stop, person));
     this.#set({ stops });
   }
 
@@ -228,7 +228,7 @@ export class LiveSocket {
     if (!this.state.runs.has(run.id)) this.#putRun(run);
   }
 
-  /** Takes over what is known of the runner from its former address, and sends on each Stop that nobody has answered. */
+  /** Takes over what the former address of the runner has said, and sends on each Stop that nobody has answered. */
   takeOver({ runs: theirs, engines, stops }: LiveState): void {
     const isNew = ({ id }: StopRequest) => this.state.stops.every((own) => own.id !== id);
     for (const stop of stops)
@@ -439,30 +439,6 @@ export class LiveSocket {
     else this.#untold ??= setTimeout(() => this.#tell(), wait);
   }
 
-  /**
-   * One that nobody has answered stays, and is sent on, until it is asked for anew; one that is not proven stays, too.
-   * Those of the same target are one, which is about all that they were about.
-   */
-  #putStop(stop: StopRequest): void {
-    const { stops } = this.state;
-    const same = (is: (each: StopRequest) => boolean, run: StopRequest["run"]) =>
-      stops.filter((each) => is(each) && each.run === run);
-    const isKept = (each: StopRequest, i: number) => {
-      if (isWaiting(each)) return each.run !== stop.run;
-      if (isUnproven(each)) return same(isUnproven, each.run).at(-1) === each;
-      const later = stops.slice(i + 1).filter((other) => !isWaiting(other) && !isUnproven(other));
-      return later.length < STOPS_KEPT - 1;
-    };
-    const joined = (last: StopRequest, all: readonly StopRequest[]) => ({
-      ...last,
-      runs: [...new Set([...all, last].flatMap(({ runs }) => runs))],
-    });
-    const kept = stops
-      .filter(isKept)
-      .map((each) => (isUnproven(each) ? joined(each, same(isUnproven, each.run)) : each));
-    this.#set({ stops: [...kept, joined(stop, same(isWaiting, stop.run))] });
-  }
-
   /** `more`: what its answer says beyond that, and what has to come after it. */
   #answerStop(
     id: string,
@@ -475,11 +451,11 @@ export class LiveSocket {
     const awaits = answer && namesMore(answer, this.state) ? ("robots" as const) : more.awaits;
     const named = answer?.runs.map((run) => run.replace(PIECE, "")) ?? [];
     const stops = this.state.stops.map((stop) => {
-      if (stop.id !== id || stop.state === "heard" || (stop.of && !heard)) return stop;
+      if (stop.id !== id || stop.state === "heard" || (stop.disownedPerson && !heard)) return stop;
       // What began until it was heard is stopped by it as well.
-      const late = heard && stop.run === "all" && tick() - stop.at > AGAIN;
-      const began = late ? openRuns(this.state).map((run) => run.id) : [];
-      const runs = [...new Set([...stop.runs, ...began, ...named])];
+      const isLate = heard && stop.run === "all" && tick() - stop.at > AGAIN;
+      const lateRuns = isLate ? openRuns(this.state).map((run) => run.id) : [];
+      const runs = [...new Set([...stop.runs, ...lateRuns, ...named])];
       const said = { ...(awaits && { awaits }), ...(isAbsent && { isAbsent }) };
       return { ...stop, state, detail, ...heard, ...said, runs };
     });
@@ -548,6 +524,23 @@ function withRuns(stop: StopRequest, runs: readonly string[]): StopRequest {
   return more.length === 0 ? stop : { ...rest, runs: [...stop.runs, ...more] };
 }
 
+/**
+ * Return the Stops with a new one. Those of the same target that nobody has answered are one, and so are those that
+ * are not proven: each is about all that they were about. Of all others the newest are kept.
+ */
+function withStop(stops: readonly StopRequest[], stop: StopRequest): StopRequest[] {
+  const isOver = (each: StopRequest) => !isWaiting(each) && !isUnproven(each);
+  const dropped = new Set(stops.filter(isOver).slice(0, 1 - STOPS_KEPT));
+  const kept = new Map<string, StopRequest>();
+  for (const each of [...stops, stop].filter((one) => !dropped.has(one))) {
+    const key = isOver(each) ? each.id : `${isWaiting(each)} ${each.run}`;
+    const before = kept.get(key);
+    kept.delete(key); // the joined one stands where the last one stood
+    kept.set(key, before ? { ...each, runs: [...new Set([...before.runs, ...each.runs])] } : each);
+  }
+  return [...kept.values()];
+}
+
 /** Return whether nobody has answered a Stop. */
 export const isWaiting = ({ state }: StopRequest): boolean =>
   state === "asked" || state === "unheard";
@@ -566,9 +559,10 @@ function namesMore({ graphs, unknown }: Stopping, now: LiveState): boolean {
   );
 }
 
-/** Return a STOP ALL that nobody has answered as one that is not sent any more, since `of` is not signed in. */
-export function disowned(stop: StopRequest, of: string): StopRequest {
-  return stop.run === "all" && isWaiting(stop) ? { ...stop, state: "refused", of } : stop;
+/** Return a STOP ALL that nobody has answered as one that is not sent any more: its person is not signed in. */
+export function disowned(stop: StopRequest, person: string): StopRequest {
+  if (stop.run !== "all" || !isWaiting(stop)) return stop;
+  return { ...stop, state: "refused", disownedPerson: person };
 }
 
 /** Calls all listeners. One that fails keeps no other one, and nothing that comes after, from its turn. */

@@ -169,8 +169,8 @@ export class RunnerSockets implements Times {
     const isDue = (stop: StopRequest) =>
       isWaiting(stop) ||
       isUnproven(stop) ||
-      (stop.state === "refused" && stop.of === undefined && stop.id === last?.id);
-    if (this.#parts.length === 0) return last !== undefined && last.of === undefined;
+      (stop.state === "refused" && stop.disownedPerson === undefined && stop.id === last?.id);
+    if (this.#parts.length === 0) return last !== undefined && last.disownedPerson === undefined;
     return this.#parts.some(({ socket: { state } }) => state.stops.some(isDue));
   }
 
@@ -210,9 +210,9 @@ export class RunnerSockets implements Times {
   }
 
   /** Sends a STOP ALL no more that no runner has heard: its person, with this name, is not the one who is signed in. */
-  disown(of: string): void {
-    this.#pressed = this.#pressed.map((stop) => ({ ...stop, ...disowned(stop, of) }));
-    for (const { socket } of this.#parts) socket.disown(of);
+  disown(person: string): void {
+    this.#pressed = this.#pressed.map((stop) => ({ ...stop, ...disowned(stop, person) }));
+    for (const { socket } of this.#parts) socket.disown(person);
     this.#hear();
   }
 

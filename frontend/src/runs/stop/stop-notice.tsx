@@ -67,9 +67,9 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const since = `asked ${duration(waited)} ago`;
   if (stop.state === "refused") {
     const told =
-      stop.of === undefined
+      stop.disownedPerson === undefined
         ? `Stop refused: ${isolated(stop.detail)}`
-        : `NOT SENT: STOP ALL of ${isolated(stop.of)}, ${clock(serverTimeOf(stop.at))}. Press STOP again.`;
+        : `NOT SENT: STOP ALL of ${isolated(stop.disownedPerson)}, ${clock(serverTimeOf(stop.at))}. Press STOP again.`;
     return { tone: "loud", text: `${told} Use the hardware stop.` };
   }
   const unsent = stop.state === "unheard" || (stop.state === "asked" && waited > HEARD);
