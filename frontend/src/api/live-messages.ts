@@ -1,4 +1,4 @@
-/** What the runner says over its live socket: whether it is whole, and what is new in it. */
+/** Validates messages of the runner, and keeps unchanged parts of a run. */
 import { isEqual } from "../graph/stop-basics";
 import type { Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
@@ -12,7 +12,7 @@ export function withUnseenEnd(run: Run, now: number): Run {
 }
 
 const isObject = (part: unknown): part is object => typeof part === "object" && part !== null;
-const isText = (part: unknown) => part == null || typeof part === "string";
+const isTextOrNull = (part: unknown) => part == null || typeof part === "string";
 
 /** Returns whether this is a list of objects with these texts. */
 function isListOf<T>(list: readonly T[], ...texts: readonly (keyof T)[]): boolean {
@@ -29,19 +29,19 @@ export function checkMessage(message: RunnerMessage): void {
   const isSound =
     isListOf(robots, "name") &&
     robots.every(
-      ({ holds }) => isListOf(holds, "graph") && holds.every(({ run }) => isText(run)),
+      ({ holds }) => isListOf(holds, "graph") && holds.every(({ run }) => isTextOrNull(run)),
     ) &&
     isListOf(runs, "id") &&
     runs.every(
       ({ alarms, unconfirmed, actions, rests }) =>
         isListOf(alarms, "code", "text") &&
-        isText(unconfirmed) &&
+        isTextOrNull(unconfirmed) &&
         Object.values(actions ?? {}).every(isObject) &&
         isListOf(rests ?? [], "robot") &&
-        (rests ?? []).every(({ why }) => isText(why)),
+        (rests ?? []).every(({ why }) => isTextOrNull(why)),
     ) &&
     (type !== "confirm" || isListOf(message.asked));
-  if (!isSound) throw new TypeError("It lacks a part.");
+  if (!isSound) throw new TypeError("The message lacks a required field.");
 }
 
 type RunActionsTold = NonNullable<Run["actions"]>;

@@ -64,7 +64,7 @@ export class SitesJoiner implements Joiner {
     return this.#partOf(siteOfId(run));
   }
 
-  /** Returns the shift, and the same one until it is off by `STEADY`, so that no message draws anew what it shows; 0 for a site with the right time. */
+  /** Returns the displayed clock shift of a site. It changes only by `STEADY` or more, so that messages cause no redraw. */
   #steadyShiftOf(socket: Part["socket"]): number {
     const [before = 0, now] = [this.#shifts.get(socket), shiftOf(socket)];
     if (Math.abs(now - before) < STEADY) return before;
@@ -107,12 +107,12 @@ export class SitesJoiner implements Joiner {
    * hides nothing: it may have moved.
    */
   #runsOf(sites: readonly Doubtful[]): LiveState["runs"] {
-    const isLast = ({ site, state }: Doubtful) => site.isUnlisted && state.link !== "live";
+    const isOutdated = ({ site, state }: Doubtful) => site.isUnlisted && state.link !== "live";
     const runs = new Map<string, Run>();
     for (const each of sites) {
       for (const [id, run] of each.state.runs) {
         const known = runs.get(id);
-        if (known && (isLast(each) || known.ended_at === null)) continue;
+        if (known && (isOutdated(each) || known.ended_at === null)) continue;
         runs.set(id, this.#runOf(run, each));
       }
     }

@@ -1,4 +1,4 @@
-/** Which sites a list lacks, since they do not answer, or not rightly; none with one runner. */
+/** Names the sites whose part of a list is missing; none with one runner. */
 import { runnerWords } from "./http";
 import { silentSites } from "./live-socket";
 import { useLive } from "./page-link";

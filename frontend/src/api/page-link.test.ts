@@ -194,7 +194,7 @@ const said = () => {
   return now && plain(wholeNotice(now, new Set(), performance.now())?.text);
 };
 
-test("a STOP ALL that no runner has heard is not sent in the name of somebody else, and said not to be", async () => {
+test("a STOP ALL that no runner has heard is not sent in the name of somebody else, and the notice says so", async () => {
   chunk.fails = false;
   await pass(6_000);
   pageLink.enter({ ...ADA, role: "viewer" }, 2);
@@ -226,7 +226,7 @@ test("a STOP ALL that no runner has heard is not sent in the name of somebody el
   expect(said()).not.toContain("Ada");
 });
 
-test("a STOP ALL of somebody who has left before any runner was known is said not to be sent", async () => {
+test("a STOP ALL of somebody who has left before any runner was known is not sent, and the notice says so", async () => {
   pageLink.leave();
   vi.resetModules();
   ({ pageLink } = await import("./page-link"));

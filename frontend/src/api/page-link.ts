@@ -83,7 +83,9 @@ class PageLink {
     if (live === null) return;
     this.#who = "";
     if (live.isStopping) {
-      this.#endWait = live.subscribe(() => live.isStopping || this.leave());
+      this.#endWait = live.subscribe(() => {
+        if (!live.isStopping) this.leave();
+      });
       return;
     }
     live.close();

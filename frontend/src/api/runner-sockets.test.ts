@@ -256,7 +256,7 @@ test("a Stop that a runner has heard is proven at the address to which it moves"
   expect(said(live.state)).toContain("Hall B: Run 1: stopped.");
 });
 
-test("a run that one site says to have ended and another one to go on goes on", async () => {
+test("a run that is open at one site stays open, although another site reports its end", async () => {
   live.setJoiner(new SitesJoiner());
   live.setSites([A, B]);
   hello(A.url, run("r"));
@@ -361,7 +361,7 @@ test("a site that is named no longer and rests is gone, and one runner needs no 
   expect(stopped()).toEqual([A.url]);
 });
 
-test("a site whose words lack a part is mute, and takes neither STOP nor a notice from the others", async () => {
+test("a site that sends incomplete messages hides neither STOP nor a notice of other sites", async () => {
   const failed = vi.spyOn(console, "error").mockImplementation(() => undefined);
   live.setSites([A, B]);
   live.setJoiner(new SitesJoiner());
